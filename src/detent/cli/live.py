@@ -35,11 +35,12 @@ def live(
     """Run an axis live, in wall time, until Ctrl-C: it then comes to rest in a ramp and lets go."""
     from detent.operate.client import LiveAxis
     from detent.operate.session import Session
-    from detent.operate.start import Place, make_host
+    from detent.operate.start import Place, make_host, shared_memory
+    from detent.operate.watchdog import Watchdog
 
-    place = Place(file)
-    host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period))
-    missing, left = host.start(), threading.Event()
+    place, (board, memory) = Place(file), shared_memory()
+    host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period), memory=memory)
+    missing, left, watchdog = host.start(), threading.Event(), Watchdog(host.board, board)
     session = Session(host, {"name": name, "file": str(file), "simulated": True, "speed": speed})
     channel = place.serve(session)
 
@@ -49,17 +50,20 @@ def live(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, leave)
     started = {"name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing}
+    started["watchdog"] = watchdog.id
     started |= {"state": host.state, "period": session.describe()["period"]}
     if as_json:
         print(json.dumps(started), flush=True)
     else:
         _tell_start(file, started)
     while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
-        pass
+        if watchdog.keep() and not as_json:
+            tell("The watchdog had ended; another one watches now.")
     died = not host.is_alive
     channel.close()
     axis = LiveAxis(session)
     axis.close()
+    watchdog.close()
     place.leave()
     status = session.status()
     if as_json:

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from mmap import mmap
 from typing import Any
 
 import numpy as np
@@ -75,11 +76,11 @@ class Host:
 
     def __init__(  # noqa: PLR0913 - an axis and its clock
         self, method: Method[Any], spec: AxisSpec, *, motor: str = "", period: float = PERIOD, speed: float = 1.0,
-        wall: bool = True, careful: bool = True, channels: Sequence[str] = (),
+        wall: bool = True, careful: bool = True, channels: Sequence[str] = (), memory: mmap | None = None,
     ) -> None:  # fmt: skip
         make = operation_params(careful=int(careful))
         self.axis: Live = method.live(spec, make, motor)
-        self.board: Any = Board()
+        self.board: Any = Board() if memory is None else Board.from_buffer(memory)
         loop = self.board.loop
         loop.period, loop.ticks, loop.wall = round(period * 1e9), period * speed / self.axis.tick, int(wall)
         self.board.operation.trust = ops.REFERENCED

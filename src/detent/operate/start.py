@@ -1,8 +1,11 @@
 """An axis file made live: `detent live`, `detent.live` and `detent.connect` begin here."""
 
+import ctypes
 import fcntl
 import os
+import tempfile
 from collections.abc import Sequence
+from mmap import mmap
 from pathlib import Path
 from typing import IO
 
@@ -12,10 +15,22 @@ from detent.methods.registry import METHODS
 from detent.operate.channel import Channel, Connection, channel_of
 from detent.operate.client import LiveAxis
 from detent.operate.host import PERIOD, Host
+from detent.operate.loop import Board
 from detent.operate.session import Session
 
 SPEEDS = 0.1, 10.0
 PERIODS = 1e-4, 0.1  # of the loop [s]
+
+
+def shared_memory() -> tuple[int, mmap]:
+    """Memory for a board that processes started from this one can map: a file without a name, that none else opens."""
+    if hasattr(os, "memfd_create"):
+        file = os.memfd_create("detent board")
+    else:
+        with tempfile.TemporaryFile() as unnamed:
+            file = os.dup(unnamed.fileno())
+    os.ftruncate(file, ctypes.sizeof(Board))
+    return file, mmap(file, 0)
 
 
 def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
@@ -26,6 +41,7 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
     speed: float = 1.0,
     wall: bool = True,
     period: float = PERIOD,
+    memory: mmap | None = None,
 ) -> tuple[Host, str]:
     """Host of the simulated axis of a file, and its name."""
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
@@ -40,7 +56,7 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
     method = METHODS[spec.axis.method]
     if not method.lives:
         raise DetentError(f"{file}: the method {spec.axis.method} has no operator yet; simulate it with: detent run")
-    return Host(method, spec, motor=motor, period=period, speed=speed, wall=wall), spec.axis.name
+    return Host(method, spec, motor=motor, period=period, speed=speed, wall=wall, memory=memory), spec.axis.name
 
 
 def live(
