@@ -138,21 +138,28 @@ GUARD_TEXT: dict[int, str] = {
 """Faults reported by a controller's guard (control.guard), by their numbers; in all of them the first cause stays."""
 
 
-LOOP_OVERRUN = 50  # fault of a live loop that cannot keep its time
+# ---- faults of a live axis that no guard of a controller sees
+DRIVE_FAULT, DRIVE_LOST, LOOP_OVERRUN, LOOP_DEAD, OTHER_HARDWARE = 24, 40, 50, 51, 70
 NO_MARK = 55  # refusal of a motion that a power cut would make a riddle of
 NOT_AT_REST, NOTHING_TO_UNDO = 111, 112  # refusals of what is asked of a position table
 
 REFUSAL_TEXT: dict[int, str] = {
+    24: "the drive tells a fault of its own, or has left its operation by itself; read its error code, mend that, then "
+    "reset",
     31: "the target lies beyond a soft limit; name one between the limits",
     35: "the position is not known, so that only creeping by a way or by hand is allowed; home the axis",
+    40: "nothing is heard from the drive for three periods of its heartbeat; check cable, supply and bus, then reset",
     41: "whoever held the jog was silent for longer than its lease; hold it again",
     43: "somebody else commands; take over first, or ask them",
     44: "a stop came after this was asked; look at the axis and ask again",
     50: "the loop came too late, for more than 5 periods or more than 3 times in a second, and the axis was stopped; "
     "give it real-time priority, or a longer period",
+    51: "the loop stood for longer than its watchdog waits, and the torque was taken away; look for what stopped the "
+    "process, then reset",
     55: "that the axis is going to move cannot be kept, so no new motion may begin, for after a power cut nobody would "
     "know where it stands; give the store room on its disk, then enable again",
     52: "a value that is no number, infinite, or a share of the speed outside 0 to 1; correct it",
+    70: "the drive is not the hardware of the axis file; connect that one, or correct hardware.id",
     101: "the axis is not enabled; enable it first",
     102: "the axis stands in a fault; read it, mend its cause, reset, then enable",
     103: "there is no fault to reset",
@@ -185,6 +192,8 @@ STEP_FAULT_TEXT: dict[int, str] = {
 
 
 TABLE_REFUSAL_TEXT: dict[int, str] = {
+    24: "the drive tells a fault of its own, or has left its operation by itself; read its error code, mend that, then "
+    "reset",
     1: "the table was still moving; start positioning when the previous one has ended or the jog has come to rest",
     2: "the position table has no such entry; add [position.NUMBER] to the axis file, or start another number",
     3: "the distance exceeds the range of the remaining angle; name a nearer angle in the position's entry, or lower "
@@ -194,6 +203,8 @@ TABLE_REFUSAL_TEXT: dict[int, str] = {
 
 
 COURSE_REFUSAL_TEXT: dict[int, str] = {
+    24: "the drive tells a fault of its own, or has left its operation by itself; read its error code, mend that, then "
+    "reset",
     1: "a place or a velocity that is no finite number, or beyond 1e9 m or 1e12 m/s; send one that the axis can have",
     2: "the target lies beyond the soft limit {limit}; name one between {lowest} and {highest}, or widen the limits",
     3: "the velocity is above the largest one, {speed}; ask for a lower one, or raise the limit of the speed",

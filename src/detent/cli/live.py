@@ -62,19 +62,23 @@ def live(
     from detent.operate.channel import channel_of
     from detent.operate.client import LiveAxis
     from detent.operate.session import Session
-    from detent.operate.start import Place, beside, make_host
+    from detent.operate.start import Place, beside, make_host, shared_memory
+    from detent.operate.watchdog import Watchdog
     from detent.panel.child import Child, PanelPlace
 
     at = PanelPlace(bind, port, certificate, key_file, plain, names or ())
     at.check()
-    place, where = Place(file), None if no_store else store or beside(file)
+    place, where, (board, memory) = Place(file), None if no_store else store or beside(file), shared_memory()
     read = read_axis(file, overrides or [])
-    host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where)
+    host, name = make_host(
+        file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where, memory=memory
+    )
     recorder = _record(host, record) if record else None
-    missing, left = host.start(), threading.Event()
+    missing, left, watchdog = host.start(), threading.Event(), Watchdog(host.board, board)
     about = {"name": name, "file": str(file), "simulated": True, "speed": speed}
     session = Session(host, about, _axis_file(read))
-    audit = Audit(Path(where or channel_of(file)).with_suffix(".audit"))
+    status = session.status()
+    audit = Audit(Path(status["store"]["path"] if status["store"] else channel_of(file)).with_suffix(".audit"))
     channel = place.serve(session, audit)
 
     def leave(_number: int, _frame: object) -> None:
@@ -84,11 +88,10 @@ def live(
         signal.signal(number, leave)
     panel = None if headless else Child(channel.path, at)
     links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
-    status = session.status()
     started = {
         "name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing,
         "state": host.state, "period": session.describe()["period"], "panel": links, "store": status["store"],
-        "unit": session.unit,
+        "unit": session.unit, "watchdog": watchdog.id,
     } | {key: status[key] for key in ("position", "trust", "find")}  # fmt: skip
     if as_json:
         print(json.dumps(started), flush=True)
@@ -97,10 +100,12 @@ def live(
     while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
         if panel and panel.mend() and not as_json:
             tell(f"The panel had ended, and runs again: {panel.link('engineer')}")
+        if watchdog.keep() and not as_json:
+            tell("The watchdog had ended; another one watches now.")
     died = not host.is_alive
     LiveAxis(session).close()
     host.note()  # the pulls of its end belong to the log
-    for one in filter(None, (panel, channel, audit, recorder)):
+    for one in filter(None, (panel, channel, audit, recorder, watchdog)):
         one.close()
     place.leave()
     _tell_end(session, as_json=as_json)

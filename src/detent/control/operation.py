@@ -151,6 +151,7 @@ class Operation(Registers):
     stop_from: f8 = register("commanded point at the last stop", unit="m")
     halted: u1 = register("1 while a stop runs out")
     softly: u1 = register("1 while a fault lets the commanded point come to rest, and hold it")
+    barred: u2 = register("why the axis may not be enabled, whatever its method says; 0 it may", unit="code")
     demand: Demand = block("what the method is told")
     answer: Answer = block("what it says")
     endings: Endings = block("how commands ended")
@@ -240,6 +241,13 @@ def fail_softly(o: Operation, code: int) -> None:
         halt(o)
 
 
+@step
+def lose_torque(o: Operation, code: int) -> None:
+    """A fault that has taken the torque, or that leaves nobody to steer by it; without torque there is none to lose."""
+    if o.state in (ENABLED, QUICK_STOP, FAULT_REACTION):
+        fail(o, code)
+
+
 # ---------------------------------------------------------------------------------------------------- what is asked
 
 
@@ -274,8 +282,8 @@ def why_not_now(q: OperationParams, o: Operation, r: Request) -> int:
         return 0 if o.kind == JOB else NO_JOB
     if r.kind == TRUST and o.state == ENABLED:
         return MOVING
-    if r.kind == ENABLE and o.answer.ready == 0:
-        return UNREADY
+    if r.kind == ENABLE:
+        return o.barred or (UNREADY if o.answer.ready == 0 else 0)
     return 0
 
 
@@ -450,7 +458,7 @@ def hand_over(o: Operation, r: Request) -> None:
 def take_order(o: Operation, order: int, number: int) -> None:
     """One order of the control word of CiA 402."""
     before = o.state
-    if order == ENABLE_OPERATION and o.answer.ready == 0:
+    if order == ENABLE_OPERATION and (o.answer.ready == 0 or o.barred):
         return
     o.state = ordered(before, order)
     if o.state == ENABLED and before != ENABLED:

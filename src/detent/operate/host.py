@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from mmap import mmap
 from typing import Any
 
 import numpy as np
@@ -124,11 +125,11 @@ class Host:
     def __init__(  # noqa: PLR0913 - an axis and its clock
         self, method: Method[Any], spec: AxisSpec, *, motor: str = "", period: float = PERIOD, speed: float = 1.0,
         wall: bool = True, careful: bool = True, channels: Sequence[str] = (), store: Store | None = None,
-        stated: bool = True,
+        stated: bool = True, memory: mmap | None = None,
     ) -> None:  # fmt: skip
         make = operation_params(careful=int(careful))
         self.axis: Live = method.live(spec, make, motor)
-        self.board: Any = Board()
+        self.board: Any = Board() if memory is None else Board.from_buffer(memory)
         loop = self.board.loop
         loop.period, loop.ticks, loop.wall = round(period * 1e9), period * speed / self.axis.tick, int(wall)
         self.board.operation.trust = ops.REFERENCED
@@ -326,7 +327,8 @@ class Host:
     def ending(self, command: int) -> Ending | None:
         """How a command has ended; None while it has not."""
         self.note()
-        if command not in self._ended and 0 < command <= self._forgotten:
+        is_open = command in (self.board.operation.running, self.board.request.id)
+        if command not in self._ended and 0 < command <= self._forgotten and not is_open:
             raise DetentError(f"command {command}: it ended long ago; of the last {KEPT} it is known how")
         return self._ended.get(command)
 

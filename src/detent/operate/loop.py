@@ -18,17 +18,19 @@ from detent.control.operation import (
     fail_softly,
     judge,
     look,
+    lose_torque,
     obey,
     off,
     stop,
     sum_of,
 )
-from detent.errors import LOOP_OVERRUN
+from detent.errors import LOOP_DEAD, LOOP_OVERRUN
 from detent.kernel.clock import monotonic_ns, sleep_until
 from detent.kernel.compiled import byte_at
 from detent.kernel.loop import Bytes, Offsets, run_serve, run_stretch
 from detent.kernel.registers import Registers, block, f8, f8_array, i8, i8_array, register, u1
 from detent.kernel.step import step
+from detent.operate.wires import Wires, give_lines, take_lines
 
 INBOX = 1024  # requests that wait at most
 AT_ONCE = 64  # of them that are taken in a period
@@ -80,6 +82,12 @@ class Loop(Registers):
     delay_at: i8 = register("period that an injected delay comes before; 0 none", unit="count")
     delay: i8 = register("injected delay", unit="ns")
     rows: i8 = register("rows of the ring written", unit="count")
+    alive: i8 = register("when the last period began: the heartbeat", unit="ns")
+    patience: i8 = register("age of the heartbeat at which the loop is dead; 0: nobody watches it", unit="ns")
+    found_dead: i8 = register("line of the watchdog: counted up when it takes the torque away", unit="count")
+    found_at: i8 = register("when it last did", unit="ns")
+    deaths: i8 = register("pulls of this line that the loop has seen", unit="count")
+    died: i8 = register("times that the loop has stood for too long", unit="count")
 
 
 class Board(Registers):
@@ -89,6 +97,7 @@ class Board(Registers):
     operation: Operation = block("states and commands")
     inbox: Inbox = block("mailbox")
     request: Request = block("the request that is being taken")
+    wires: Wires = block("lines that a driver holds")
 
 
 @step
@@ -122,6 +131,18 @@ def see_lines(b: Board) -> None:
         loop.pulled[loop.pulls % PULLS] = loop.periods
         loop.pulls += 1
         stop(o, 0)
+
+
+@step
+def see_watchdog(b: Board, now: int) -> None:
+    """A loop that stood for too long finds itself without torque, whether its watchdog has seen that or not."""
+    loop = b.loop
+    stood = 0 < loop.patience < now - loop.alive and loop.alive > 0
+    if stood or loop.found_dead != loop.deaths:
+        loop.deaths = loop.found_dead
+        loop.died += 1
+        lose_torque(b.operation, LOOP_DEAD)
+    loop.alive = now
 
 
 @step
@@ -216,12 +237,18 @@ def run_loop(  # noqa: PLR0913 - an axis, how it is operated, and who sees it
         loop.deadline = monotonic_ns()
     while done < most and loop.leave == 0:
         now = wait_for_period(b)
+        see_watchdog(b, now)
         note_lateness(b, now - loop.deadline)
+        if b.wires.driven:
+            take_lines(b.wires, b.operation, r.lines, now)
         run_period(p, r, q, memory, b, *feed)
+        if b.wires.driven:
+            give_lines(b.wires, r.lines)
         write_ring(r, b, ring, of_board, of_axis)
         done += 1
         if loop.wall:
             spent = monotonic_ns() - now
             loop.work += spent
             loop.longest = max(loop.longest, spent)
+    loop.left = loop.leave
     return done

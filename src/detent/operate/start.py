@@ -1,8 +1,11 @@
 """An axis file made live: `detent live`, `detent.live` and `detent.connect` begin here."""
 
+import ctypes
 import fcntl
 import os
+import tempfile
 from collections.abc import Sequence
+from mmap import mmap
 from pathlib import Path
 from typing import IO, Any
 
@@ -13,12 +16,24 @@ from detent.operate.audit import Audit
 from detent.operate.channel import Channel, Connection, channel_of
 from detent.operate.client import LiveAxis
 from detent.operate.host import PERIOD, Host, operation_params
+from detent.operate.loop import Board
 from detent.operate.opening import store_path
 from detent.operate.session import Session
 from detent.operate.store import Store
 
 SPEEDS = 0.1, 10.0
 PERIODS = 1e-4, 0.1  # of the loop [s]
+
+
+def shared_memory() -> tuple[int, mmap]:
+    """Memory for a board that processes started from this one can map: a file without a name, that none else opens."""
+    if hasattr(os, "memfd_create"):
+        file = os.memfd_create("detent board")
+    else:
+        with tempfile.TemporaryFile() as unnamed:
+            file = os.dup(unnamed.fileno())
+    os.ftruncate(file, ctypes.sizeof(Board))
+    return file, mmap(file, 0)
 
 
 def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
@@ -30,6 +45,7 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
     wall: bool = True,
     period: float = PERIOD,
     store: Path | str | None = None,
+    memory: mmap | None = None,
 ) -> tuple[Host, str]:
     """Host of the simulated axis of a file, and its name; `store` is where it keeps what survives, None nowhere."""
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
@@ -44,7 +60,7 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
     method = METHODS[read.spec.axis.method]
     if not method.lives:
         raise DetentError(f"{file}: the method {method.name} has no operator yet; simulate it with: detent run")
-    chosen: dict[str, Any] = {"motor": motor, "period": period, "speed": speed, "wall": wall}
+    chosen: dict[str, Any] = {"motor": motor, "period": period, "speed": speed, "wall": wall, "memory": memory}
     if store is None:
         return Host(method, read.spec, **chosen), read.spec.axis.name
     motors = method.sensors(read.spec)
