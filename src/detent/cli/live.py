@@ -87,8 +87,8 @@ def live(
     else:
         _tell_start(file, started)
     while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
-        if panel and panel.mend() and not as_json:
-            tell(f"The panel had ended, and runs again: {panel.link('engineer')}")
+        if panel and (told := panel.mend()) and not as_json:
+            tell(told)
     died = not host.is_alive
     axis = LiveAxis(session)
     axis.close()
