@@ -192,8 +192,6 @@ STEP_FAULT_TEXT: dict[int, str] = {
 
 
 TABLE_REFUSAL_TEXT: dict[int, str] = {
-    24: "the drive tells a fault of its own, or has left its operation by itself; read its error code, mend that, then "
-    "reset",
     1: "the table was still moving; start positioning when the previous one has ended or the jog has come to rest",
     2: "the position table has no such entry; add [position.NUMBER] to the axis file, or start another number",
     3: "the distance exceeds the range of the remaining angle; name a nearer angle in the position's entry, or lower "
@@ -203,8 +201,6 @@ TABLE_REFUSAL_TEXT: dict[int, str] = {
 
 
 COURSE_REFUSAL_TEXT: dict[int, str] = {
-    24: "the drive tells a fault of its own, or has left its operation by itself; read its error code, mend that, then "
-    "reset",
     1: "a place or a velocity that is no finite number, or beyond 1e9 m or 1e12 m/s; send one that the axis can have",
     2: "the target lies beyond the soft limit {limit}; name one between {lowest} and {highest}, or widen the limits",
     3: "the velocity is above the largest one, {speed}; ask for a lower one, or raise the limit of the speed",

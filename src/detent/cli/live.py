@@ -98,8 +98,8 @@ def live(
     else:
         _tell_start(file, started)
     while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
-        if panel and panel.mend() and not as_json:
-            tell(f"The panel had ended, and runs again: {panel.link('engineer')}")
+        if panel and (told := panel.mend()) and not as_json:
+            tell(told)
         if watchdog.keep() and not as_json:
             tell("The watchdog had ended; another one watches now.")
     died = not host.is_alive

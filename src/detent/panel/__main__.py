@@ -18,16 +18,19 @@ from detent.panel.sockets import LONGEST_FRAME
 
 
 def listen(addresses: Sequence[str], port: int) -> list[socket.socket]:
-    """Sockets on one port of each address; one that this machine has not is left out, if it is not the only one."""
+    """Sockets on one port of each address; one behind the first that this machine has not is left out."""
     found: list[socket.socket] = []
     for address in addresses:
         family = socket.AF_INET6 if ":" in address else socket.AF_INET
         try:
             one = socket.create_server((address, port), family=family)
         except OSError:
-            if not found and address == addresses[-1]:
+            if not found:
                 raise
             continue
+        # What is accepted inherits it; asyncio leaves it out where a socket was not made for TCP by name. Without it a
+        # small message waits 40 ms for the acknowledgement of the one before it.
+        one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         port = one.getsockname()[1]
         found.append(one)
     return found
@@ -45,12 +48,17 @@ def make_server(told: dict[str, Any]) -> tuple[uvicorn.Server, list[socket.socke
         ws="websockets-sansio", http="h11", ws_max_size=LONGEST_FRAME, ws_per_message_deflate=False,
         ws_ping_interval=5.0, ws_ping_timeout=5.0, timeout_graceful_shutdown=1, **tls,
     )  # fmt: skip
+    config.load()  # the certificate, too
     return uvicorn.Server(config), sockets, panel
 
 
 async def serve(told: dict[str, Any]) -> None:
     """Serve until told to end."""
-    server, sockets, panel = make_server(told)
+    try:
+        server, sockets, panel = make_server(told)
+    except OSError as error:
+        sys.stdout.write(json.dumps({"error": error.strerror or str(error)}))
+        return
     ending = asyncio.ensure_future(_until_told(server, panel))
     sys.stdout.write(json.dumps({"port": sockets[0].getsockname()[1]}) + "\n")
     sys.stdout.flush()

@@ -6,13 +6,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from detent.errors import AxisError, DetentError
 from detent.files.text import shown
-from detent.panel.keys import keep_keys, keys_of, link_of, make_keys
+from detent.panel.keys import ROLES, keep_keys, keys_of, link_of, make_keys
 
 LOOPBACK = ("127.0.0.1", "::1")
 
@@ -59,7 +60,7 @@ class Child:
     def __init__(self, channel: Path, place: PanelPlace) -> None:
         place.check()
         self._channel, self._place, self._keys = channel, place, make_keys()
-        self._port = place.port
+        self._port, self._gone = place.port, False
         self.keys_file = keys_of(channel)
         self._start()
 
@@ -77,13 +78,16 @@ class Child:
         )  # fmt: skip
         assert self._process.stdin is not None  # noqa: S101 - it is a pipe
         assert self._process.stdout is not None  # noqa: S101 - it is a pipe
-        self._process.stdin.write(json.dumps(told) + "\n")
-        self._process.stdin.flush()
-        answer = self._process.stdout.readline()
-        if not answer:
-            raise AxisError(f"the panel did not start on {place.bind or LOOPBACK[0]} port {self._port or 'any'}; "
-                            "choose another with --port, or do without: --headless")  # fmt: skip
-        self._port = json.loads(answer)["port"]
+        with suppress(BrokenPipeError):  # it has ended: no answer tells so
+            self._process.stdin.write(json.dumps(told) + "\n")
+            self._process.stdin.flush()
+        answer: dict[str, Any] = json.loads(self._process.stdout.readline() or "{}")
+        if "port" not in answer:
+            self._process.communicate()
+            at = f"{place.bind or LOOPBACK[0]}, port {self._port or 'any'}"
+            why = f"the panel did not start at {at} ({answer.get('error', 'its process ended')})"
+            raise AxisError(f"{why}; choose --bind, --port or certificate anew, or do without it: --headless")
+        self._port = answer["port"]
         keep_keys(self.keys_file, self.address, self._keys)
 
     @property
@@ -97,12 +101,17 @@ class Child:
         """A one-time link."""
         return link_of(self.keys_file, role, time.time())
 
-    def mend(self) -> bool:
-        """Start it again where it has died; tells whether it had."""
-        if self._process.poll() is None:
-            return False
-        self._start()
-        return True
+    def mend(self) -> str:
+        """Start it again where it has died; tells what has happened, if anything has."""
+        if self._gone or self._process.poll() is None:
+            return ""
+        self.close()
+        try:
+            self._start()
+        except AxisError as error:  # the axis goes on without it
+            self._gone = True
+            return f"The panel has ended: {error}"
+        return f"The panel had ended, and runs again: {self.link(ROLES[-1])}"
 
     def close(self) -> None:
         """End it."""
@@ -113,4 +122,6 @@ class Child:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
         self.keys_file.unlink(missing_ok=True)
