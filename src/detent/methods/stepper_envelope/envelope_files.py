@@ -4,7 +4,6 @@ The header's registers, numbers and words are those of the control unit and the 
 from the same declarations, so firmware and simulation cannot drift apart. Its text, with the rule, is step_rule.h.in.
 """
 
-import ctypes
 import re
 import zlib
 from collections.abc import Callable
@@ -26,13 +25,14 @@ from detent.control.step_timer import StepTimer
 from detent.files.marks import IN_C, signed
 from detent.files.screen import OnScreen
 from detent.files.text import check_target, shown, write_text
+from detent.kernel.registers import Registers
 from detent.methods.stepper_envelope.build import make_tables
 from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.summary import units_of
 from detent.page.parts import Numbers
 from detent.page.plots import COLOURS, new_figure
-from detent.planning.step_envelope import ENTRY_BYTES, INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
+from detent.planning.step_envelope import ENTRY_BYTES, INDEX_BITS, INDEX_MASK, SENTINEL, StepEnvelope
 from detent.record.trace_files import write_csv
 from detent.units import format_quantity
 
@@ -43,6 +43,8 @@ Axes = Any
 LINE = 110  # longest line of a comment in the header
 PER_LINE = 16  # numbers of up to five digits in a line of the header; of longer ones, half as many
 MARK = "\0mark"  # stands for the checksum of a header's code, until that is known
+PAGE = 256  # entries of a table that firmware keeps together: the low byte of a position is the place in its page
+PER_OBJECT = 63  # pages in one object in C: avr-gcc takes 32767 bytes at most
 PLACE_DIGITS = 12  # decimals of a position in metres or radians: a picometre, far below any step
 
 BLUE, ORANGE = COLOURS[:2]
@@ -139,13 +141,64 @@ def write_envelope_csv(tables: EnvelopeTables, path: str | Path, *, force: bool 
 # ---- C header
 
 
+@dataclass(frozen=True)
+class Paged:
+    """Both tables as firmware keeps them: pages of entries, those that are alike once, and their order."""
+
+    pages: NDArray[np.int16]  # shape (P, PAGE)
+    up: Words  # number of the page of each PAGE positions
+    down: Words
+    own: int  # pages that two stops need which move: the ramp down to each, and the stop
+
+    @property
+    def objects(self) -> list[NDArray[np.int16]]:
+        """The pages, as many together as every compiler takes."""
+        return [self.pages[first : first + PER_OBJECT] for first in range(0, len(self.pages), PER_OBJECT)]
+
+    @property
+    def bytes(self) -> int:
+        """Memory of the pages."""
+        return self.pages.nbytes
+
+    @property
+    def number_bytes(self) -> int:
+        """Width of a page's number."""
+        return 1 if len(self.pages) + self.own <= 1 << 8 else 2
+
+    @property
+    def order_bytes(self) -> int:
+        """Memory of the order of the pages, both directions."""
+        return self.number_bytes * (len(self.up) + len(self.down))
+
+
+def paged(tables: EnvelopeTables) -> Paged:
+    """Both tables in pages; beyond the travel, where nothing is read, are sentinels."""
+    steps, reach = tables.steps, len(tables.up.ramp)
+    flat = np.full((2, -(-(steps + 1) // PAGE) * PAGE), SENTINEL, np.int16)
+    flat[:, : steps + 1] = tables.up.entries, tables.down.entries
+    pages, numbers = np.unique(flat.reshape(-1, PAGE), axis=0, return_inverse=True)
+    up, down = numbers.reshape(2, -1).astype(np.int64)
+    return Paged(pages, up, down, own=2 * (1 + -(-reach // PAGE)))
+
+
+def register_types(tables: EnvelopeTables, registers: type[Registers]) -> dict[str, str]:
+    """C type of each register, as wide as its values need; what only grows wraps at 32 bits.
+
+    Only a motor in fault goes beyond the ends of its travel, by a ramp at most.
+    """
+    near = tables.steps + len(tables.up.ramp) <= np.iinfo(np.int16).max
+    needed = {"period": "int32_t", "expires": "uint32_t", "pulses": "uint32_t"}
+    needed["position"] = "int16_t" if near else "int32_t"
+    return {leaf.path: needed.get(leaf.path, leaf.width.c_name) for leaf in registers.leaves()}
+
+
 def write_envelope_header(tables: EnvelopeTables, path: str | Path, *, force: bool = False) -> None:
     """Write tables, ramp list, registers and step rule of one motor as a C99 header that needs only <stdint.h>.
 
     Every name in it begins with that of the motor, so that one firmware can include several; two headers of one motor,
-    as of two axes that call theirs alike, do not compile together. The rule is the
-    ramp-limited one; the same calls leave the same bits in the same registers as in a simulation. The tables are
-    arguments of the rule: firmware may run on the constants of the header, or on copies in RAM that it edits.
+    as of two axes that call theirs alike, do not compile together. The rule is the ramp-limited one; the same calls
+    leave the same values in the same registers as in a simulation. On AVR tables and ramp list stay in flash; stops
+    that move take pages in RAM.
     """
     text = _header(tables)
     code = text.partition("\n#ifndef")[2]  # without the comment in front: it may name another axis
@@ -159,7 +212,8 @@ def _header(tables: EnvelopeTables) -> str:
     environment.filters |= {"comment": _comment, "numbers": _numbers, "place": places}
     template = resources.files("detent.methods.stepper_envelope").joinpath("step_rule.h.in").read_text(encoding="utf-8")
     ramp, limit = tables.words()
-    memory = envelope_memory(tables.up.ramp, tables.up.zones)
+    wide = tables.word_bytes > 2
+    parts, types = paged(tables), register_types(tables, StepRule) | register_types(tables, StepTimer)
     return environment.from_string(template).render(
         tables=tables,
         motor=tables.motor,
@@ -167,9 +221,17 @@ def _header(tables: EnvelopeTables) -> str:
         ramp=ramp,
         limit=limit,
         limits=[f"{hz:g} Hz" for hz in tables.up.zones.limits],
-        table_bytes=memory.tables + 2 * ENTRY_BYTES,
-        register_bytes=ctypes.sizeof(StepRule) + ctypes.sizeof(StepTimer),
-        compact=memory.compact,
+        paged=parts,
+        page=PAGE,
+        page_bytes=PAGE * ENTRY_BYTES,
+        per_object=PER_OBJECT,
+        table_bytes=2 * ENTRY_BYTES * (tables.steps + 1),
+        number=f"uint{8 * parts.number_bytes}_t",
+        word="int32_t" if wide else "uint16_t",
+        read="dword" if wide else "word",
+        types=types,
+        place=types["position"],
+        at="uint16_t" if tables.steps <= np.iinfo(np.uint16).max else "uint32_t",
         index_mask=f"0x{INDEX_MASK:04X}",
         index_bits=INDEX_BITS,
         rule=StepRule,
@@ -349,5 +411,5 @@ class Envelope(OnScreen):
             "start_hz": float(t.up.ramp.hz[0]),
             "top_hz": float(t.up.ramp.hz[-1]),
             "run_up": t.up.ramp.duration,
-            "bytes": t.up.entries.nbytes + t.down.entries.nbytes + len(t.up.ramp) * t.word_bytes,
+            "bytes": (pages := paged(t)).bytes + pages.order_bytes + len(t.up.ramp) * t.word_bytes,
         }
