@@ -18,7 +18,7 @@ File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=Fal
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
 PERIOD = "Time between two periods of the loop; a machine without real-time priority may need a longer one."
 FOR = "End after so many seconds by itself."
-WORD = "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home."
+WORD = "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home, inject, faults."
 
 
 @app.command()
@@ -104,6 +104,7 @@ def connect(
     as_json: Json = False,
 ) -> None:
     """Ask an axis that runs live for something, and wait until that has ended."""
+    from detent.operate.faults import describe_fault
     from detent.operate.start import connect as connect_to
     from detent.operate.words import describe_status
 
@@ -114,12 +115,15 @@ def connect(
             raise DetentError('connect: a jog needs a velocity such as "20 mm/s"')
         with axis.jog(value):
             threading.Event().wait(seconds)
-    elif word != "status":
+    elif word not in {"status", "faults"}:
         ended = axis.do(word, value, speed, wait=False).wait().to_dict()
-    status = axis.status
+    status, faults = axis.status, axis.faults if word == "faults" else []
     if as_json:
-        print_json({"status": status, "ended": ended, "why_not_moving": axis.why_not_moving})
+        found = {"faults": faults} if word == "faults" else {}
+        print_json({"status": status, "ended": ended, "why_not_moving": axis.why_not_moving} | found)
         return
+    for one in faults:
+        tell(describe_fault(one))
     tell(describe_status(status, axis.unit))
     for what, remedy in axis.why_not_moving:
         tell(f"  not moving: {what}; {remedy}")

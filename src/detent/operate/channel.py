@@ -1,8 +1,9 @@
 """The local channel to a live axis: a socket of the system, so that other processes may ask, watch, and be killed.
 
 A message is a line of JSON, 64 kB at most. A client asks ``{"do": "move_to", "value": "120 mm", "as": 7}`` and hears
-``{"as": 7, "id": 31}``, later ``{"ended": {...}}``; ``{"do": "status"}`` and ``{"do": "describe"}`` are answered at
-once. A client that does not read what it is sent is dropped; one that is gone leaves its jog to the lease.
+``{"as": 7, "id": 31}``, later ``{"ended": {...}}``; ``{"do": "status"}``, ``{"do": "describe"}`` and
+``{"do": "faults"}`` are answered at once. A client that does not read what it is sent is dropped; one that is gone
+leaves its jog to the lease.
 """
 
 import asyncio
@@ -122,6 +123,8 @@ class Channel:
             return {"status": self.session.status()}
         if do == "describe":
             return {"describe": self.session.describe()}
+        if do == "faults":
+            return {"faults": self.session.faults()}
         speed = asked.get("speed", 1.0)
         if not isinstance(do, str) or isinstance(speed, bool) or not isinstance(speed, int | float):
             raise DetentError('a message is an object with "do", a command, and perhaps "value" and "speed", a number')
@@ -197,6 +200,10 @@ class Connection:
     def status(self) -> dict[str, Any]:
         """The axis now."""
         return self._request({"do": "status"})["status"]
+
+    def faults(self) -> list[dict[str, Any]]:
+        """The last faults."""
+        return self._request({"do": "faults"})["faults"]
 
     def ask(self, word: str, value: object = None, speed: float = 1.0) -> int:
         """Ask for something; gives an id."""

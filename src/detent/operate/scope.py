@@ -4,6 +4,7 @@ The loop writes a row and then counts it; it never waits for a reader. A reader 
 again: what the loop may have overwritten meanwhile is dropped, and how much was missed is said.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,7 +15,8 @@ from detent.kernel.registers import Leaf, Registers
 from detent.operate.loop import Board
 from detent.record.recorder import byte_places, choose_leaves
 
-ROWS = 8192  # of the ring, 8 s at 1 kHz
+ROWS = 8192  # of the ring at least, 8 s at 1 kHz
+HELD = 6.0  # time that the ring holds at least [s]
 CHANNELS = 8
 SPARE = 64  # rows behind the loop's that a reader leaves alone: it may be writing them
 SHOWN = (
@@ -31,7 +33,8 @@ class Scope:
         self._board, self._registers = board, registers
         self.of_board = byte_places(_FIXED)
         self.of_axis = np.zeros(8 * CHANNELS, np.int64)
-        self.ring = np.zeros((ROWS, len(self.of_board) + len(self.of_axis)), np.uint8)
+        self.size = max(ROWS, math.ceil(HELD * 1e9 / board.loop.period))
+        self.ring = np.zeros((self.size, len(self.of_board) + len(self.of_axis)), np.uint8)
         self.channels: list[Leaf] = []
         self.show(channels)
 
@@ -59,8 +62,8 @@ class Scope:
     def rows(self, after: int) -> tuple[NDArray[Any], int, int]:
         """Rows from number `after` on: these, the number of the next one, and how many were missed."""
         written = int(self._board.loop.rows)
-        first = max(after, written - ROWS + SPARE, self.since)
-        copied = self.ring[np.arange(first, written) % ROWS]
-        lowest = int(self._board.loop.rows) - ROWS + 1  # the loop may be writing this one by now
+        first = max(after, written - self.size + SPARE, self.since)
+        copied = self.ring[np.arange(first, written) % self.size]
+        lowest = int(self._board.loop.rows) - self.size + 1  # the loop may be writing this one by now
         kept = copied[max(0, lowest - first) :]
         return kept.view(self.row)[:, 0], written, max(first, lowest) - after

@@ -6,10 +6,12 @@ from typing import Any
 
 from detent.control import operation as ops
 from detent.errors import DetentError
+from detent.operate.faults import injection_of, injections
 from detent.operate.host import Host
 from detent.operate.words import WORDS, Ended, ended, status_of, value_of
 
 STEP = 2e-3  # how often an ending is looked for [s]
+NOTE = 0.5  # how often what nobody asks for is taken down [s]
 
 
 class Session:
@@ -18,16 +20,26 @@ class Session:
     def __init__(self, host: Host, about: Mapping[str, Any]) -> None:
         self.host, self.about = host, dict(about)
         self.unit = host.axis.unit
-        self._lock = threading.Lock()
+        self._lock, self._left = threading.Lock(), threading.Event()
+        if host.is_running:
+            threading.Thread(target=self._keep_noting, name="notes", daemon=True).start()
+
+    def _keep_noting(self) -> None:
+        """Take note of faults, and of what came from outside, before the loop's memory of it has come round."""
+        while not self._left.wait(NOTE):
+            with self._lock:
+                self.host.note()
 
     def describe(self) -> dict[str, Any]:
         """What does not change: name, method, unit, period, commands."""
         offered = self.host.axis.live.operation.takes
-        words = [word for word, (kind, *_) in WORDS.items() if offered >> kind & 1]
+        can_inject = injections(self.host.axis.places)
+        words = [word for word, (kind, *_) in WORDS.items() if offered >> kind & 1 or (word == "inject" and can_inject)]
         q = self.host.axis.live.operation
         limits = None if q.endless else [q.lowest, q.highest]
         period = self.host.board.loop.period * 1e-9
-        return self.about | {"unit": self.unit, "period": period, "commands": words, "limits": limits}
+        about = {"unit": self.unit, "period": period, "commands": words, "limits": limits}
+        return self.about | about | {"injections": can_inject}
 
     def status(self) -> dict[str, Any]:
         """The axis now."""
@@ -41,10 +53,26 @@ class Session:
             self.host.stop()
         if word == "disable":
             self.host.off()
-        about = value_of(WORDS[word], value, self.unit)
+        kind = WORDS[word].kind
+        if word == "inject":
+            kind, about = injection_of(self.host.axis.places, value)
+        else:
+            about = value_of(WORDS[word], value, self.unit)
         with self._lock:
             self.host.note()  # of what nobody waits for, too: the loop keeps the last endings only
-            return self.host.ask(WORDS[word].kind, about, speed, client=client, **more)
+            return self.host.ask(kind, about, speed, client=client, **more)
+
+    def faults(self) -> list[dict[str, Any]]:
+        """The last faults, the first of them first."""
+        with self._lock:
+            self.host.note()
+            return [one.to_dict() for one in self.host.faults.records]
+
+    def fault_trace(self, number: int) -> dict[str, list[float]]:
+        """Columns of the ring from 2 s before to 2 s after a fault."""
+        with self._lock:
+            self.host.note()
+            return self.host.faults.trace(number)
 
     def ending(self, command: int) -> Ended | None:
         """How a command has ended; None while it has not."""
@@ -70,4 +98,5 @@ class Session:
 
     def close(self) -> None:
         """Come to rest, take the torque away, end the loop."""
+        self._left.set()
         self.host.close()
