@@ -132,6 +132,7 @@ GUARD_TEXT: dict[int, str] = {
     12: "the axis ran faster than {speed}, and the drive is off; check for an external force, a miscounting sensor, or "
     "an unstable loop (protection.overspeed)",
     13: "the axis did not arrive within {arrival}; check for a load it cannot hold, or allow more time",
+    52: "a value in the loop was no number, and the drive is off; check the sensor and what computes with it",
     32: "the axis overran the {side} end of travel, {end}, and the drive is off; keep the moves farther from "
     "the ends, or damp the overshoot",
 }

@@ -24,7 +24,7 @@ import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests import live_course
+from tests import live_course, live_faults
 from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
 from tests.course_rig import excursions, follow, shortest_stop, turns
 from tests.difference import diff
@@ -40,6 +40,7 @@ from detent.control.axis_states import ORDER_NAMES, STATE_NAMES, ordered
 from detent.control.guard import FOLLOWING, STUCK
 from detent.control.head_computer import IDLE
 from detent.control.operation import ABORTED, DONE, REFUSED
+from detent.control.reaction import REACTION_NAMES, RULES, rule_of
 from detent.control.step_rule import INFEASIBLE
 from detent.errors import LOOP_OVERRUN, DetentError
 from detent.kernel.loop import advance, replay
@@ -52,9 +53,12 @@ from detent.methods.print_head.run import SimulatedPrinting, print_job
 from detent.methods.registry import METHODS
 from detent.methods.stepper_envelope.host import StageHost
 from detent.methods.stepper_envelope.stage_job import Change, StageMove
+from detent.operate.faults import injection_of
 from detent.operate.host import Ending, Host, repeat
+from detent.operate.session import Session
 from detent.planning import course
 from detent.planning.course import advance as advance_course
+from detent.plant.injection import BLOCKED
 
 SAMPLES = 50
 """Of the standard job, each of so many ticks as it takes from one to the next: both of its commands."""
@@ -1505,3 +1509,170 @@ def test_46_a_table_goes_to_its_own_numbers_and_to_those_that_were_taught(tmp_pa
         assert math.degrees(axis.position) % 360 == pytest.approx(10.0, abs=0.01)
         with pytest.raises(detent.DetentError, match="202"):
             axis.go_to(55)
+
+
+# ---- faults
+
+
+@pytest.mark.parametrize("name", ["cascade", "filtered_servo", "rotary_table"])
+def test_37_a_tick_with_nothing_wrong_is_the_tick(name):
+    """The tick that an injection needs, with a push of no force: the same bytes as the one without."""
+    ones, others = Bench(name).enable(), Bench(name).enable()
+    place = next(place for place, one in others.host.axis.places.items() if BLOCKED in one.kinds)
+    others.host.ask(
+        *injection_of(others.host.axis.places, f"{place} push 0 {others.host.axis.places[place].push_unit}")
+    )
+    ones.host.ask(ops.KEEP)
+    for bench in (ones, others):
+        bench.host.ask(*((ops.JOG, 0.5) if name == "rotary_table" else (ops.MOVE_BY, 5e-3)))
+        bench.pass_time(0.4)
+    assert others.host.board.injection.place
+    assert diff(ones.host.axis.state, others.host.axis.state) == {}
+
+
+def test_37_a_session_with_faults_is_repeated_to_the_same_bytes():
+    first = Bench("cascade").enable()
+    for text in (
+        "encoder garbage",
+        "nothing",
+        "encoder intermittent",
+        "nothing",
+        "drive delayed 3 ms",
+        "load push 50 N",
+    ):
+        first.host.ask(*injection_of(first.host.axis.places, text))
+        for kind, value in ((ops.RESET, 0.0), (ops.ENABLE, 0.0), (ops.CONFIRM, 0.0), (ops.MOVE_BY, 0.01)):
+            first.host.ask(kind, value)
+            first.host.run(13)
+        first.pass_time(0.2)
+    assert first.host.board.faults.count > 1
+    second = Bench("cascade")
+    repeat(second.host, first.host.log, first.loop.periods)
+    assert diff(first.host.axis.state, second.host.axis.state) == {}
+    assert diff(first.operation, second.operation) == {}
+    assert bytes(first.host.board.injection) == bytes(second.host.board.injection)
+
+
+SAMPLE = [  # of the matrix: place, kind, state; what is found, after how long at most, whether the position is known
+    ("cascade", "encoder", "stuck", "move", "F02", 0.052, False),
+    ("cascade", "encoder", "intermittent", "rest", "F03", 0.022, False),
+    ("cascade", "encoder", "off", "move", "F10", 0.025, True),
+    ("cascade", "drive", "wrong", "power-up", "F04", 0.6, False),
+    ("cascade", "drive", "stuck", "move", "F12", 0.07, False),
+    ("cascade", "load", "blocked", "stop", "F02", 0.06, False),
+    ("cascade", "load", "blocked", "rest", "nothing", 0.0, True),
+    ("filtered_servo", "encoder", "wrong", "move", "F04", 0.03, False),
+    ("filtered_servo", "slide", "blocked", "move", "F02", 0.06, False),
+    ("phase_servo", "carriage", "blocked", "move", "F02", 0.06, False),
+    ("rotary_table", "fine resolver", "garbage", "rest", "F12", 0.05, False),
+    ("rotary_table", "table", "blocked", "move", "F02", 0.1, False),
+]
+
+
+@pytest.mark.parametrize(("name", "place", "kind", "state", "found", "within", "known"), SAMPLE)
+def test_37_a_fault_is_found_in_time_and_followed_as_its_rule_says(name, place, kind, state, found, within, known):
+    check_cell(cell := live_faults.rig(name).cell(place, kind, state))
+    assert (cell.found, cell.known) == (found, known)
+    assert cell.seconds <= within
+
+
+def check_cell(cell: live_faults.Cell) -> None:
+    """Reaction, trust and recovery are those of its rule; a ramp may end in torque off, where it makes things worse."""
+    if cell.code == 0:
+        return
+    rule = rule_of(cell.code)
+    assert cell.code in RULES
+    assert cell.reaction in {REACTION_NAMES[rule.reaction], "torque off"}
+    assert rule.recovery != "H" or not cell.known
+    assert cell.recovered.startswith("reset enable")
+    assert cell.known or "reference" in cell.recovered or cell.name == "print_head"
+
+
+@pytest.mark.wide
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes of six axes")
+def test_37_every_fault_in_every_state_and_the_page_of_it():
+    found = [one for name in live_faults.FILES for one in live_faults.run(name)]
+    assert len(found) >= 500
+    for cell in found:
+        check_cell(cell)
+    assert live_faults.page(found) == live_faults.PAGE.read_text("utf-8")
+
+
+def test_38_the_first_cause_is_kept_with_all_that_is_known_of_it():
+    bench = Bench("cascade").enable()
+    session = Session(bench.host, {"name": "x"})
+    session.ask("inject", "encoder off")
+    bench.host.ask(ops.MOVE_BY, 0.2)
+    bench.pass_time(2.0)  # what follows from it comes, too: the axis rolls on under a dead encoder
+    session.ask("inject", "nothing")
+    bench.pass_time(0.5)
+    (fault,) = session.faults()
+    assert (fault["number"], fault["code"], bench.operation.fault) == (1, "F02", 2)
+    assert (fault["position"], fault["reaction"], fault["unit"]) == ("lost", "torque off", "%")
+    assert fault["limit"] == bench.spec.protection.stuck_effort < abs(fault["value"]) <= 1.0
+    assert "sensor did not move" in fault["text"]
+    assert fault["causes"]
+    assert fault["steps"]
+    assert fault["allowed"][:3] == ["reset", "enable", "home"]
+    assert fault["time"] == pytest.approx(fault["period"] * 1e-3)
+    assert session.status()["trust"] == "unknown"
+
+
+@pytest.mark.parametrize("period", [1e-3, 0.25e-3])
+def test_38_the_ring_is_kept_from_two_seconds_before_to_two_after(period):
+    bench = Bench("cascade", period=period, channels=["lines.motor.count"]).enable()
+    bench.pass_time(2.0)
+    bench.host.ask(ops.MOVE_BY, 0.2)
+    bench.pass_time(0.1)
+    bench.host.ask(*injection_of(bench.host.axis.places, "encoder stuck"))
+    bench.pass_time(20.0)  # the ring has come round since
+    trace = bench.host.faults.trace(1)
+    assert trace["time"][0] == pytest.approx(-2.0, abs=1e-9)
+    assert trace["time"][-1] == pytest.approx(2.0, abs=1e-9)
+    assert np.diff(trace["time"]) == pytest.approx(period)
+    at = trace["time"].index(0.0)
+    assert (trace["operation.fault"][at - 1], trace["operation.fault"][at]) == (0, 2)
+    assert len(set(trace["lines.motor.count"][: at - round(0.06 / period)])) > 50
+    assert len(set(trace["lines.motor.count"][at - round(0.04 / period) : at])) == 1
+    with pytest.raises(DetentError, match="one of the last"):
+        bench.host.faults.trace(2)
+
+
+RUNS = {  # what a fault-free hour consists of: a motion there and back, again and again
+    "cascade": 0.1, "filtered_servo": 0.05, "phase_servo": 0.05, "rotary_table": 0.0, "print_head": 0.05, "zoom": 0.01,
+}  # fmt: skip
+
+
+def false_alarms(name: str, seconds: float) -> tuple[int, int]:
+    """Faults and motions of an example that nothing is wrong with, in a time of the axis [s]."""
+    rig = live_faults.rig(name)
+    rig.bring("rest")
+    host, motions, jogs = rig.host, 0, name == "rotary_table"
+    begun, before = int(host.board.loop.periods), int(host.board.faults.count)
+    way = RUNS[name] if rig.operation.answer.commanded < 0.2 else -RUNS[name]
+    while (host.board.loop.periods - begun) * host.board.loop.period < seconds * 1e9:
+        ending = rig.ask(*((ops.GO, 1 + motions % 3) if jogs else (ops.MOVE_BY, way)))
+        assert ending is not None
+        assert ending.how == ops.DONE, (name, motions, ending)
+        way, motions = -way, motions + 1
+    return int(host.board.faults.count) - before, motions
+
+
+@pytest.mark.parametrize("name", ["cascade", "filtered_servo", "rotary_table"])
+def test_39_a_few_seconds_without_a_fault(name):
+    faults, motions = false_alarms(name, 5.0)
+    assert (faults, motions > 2) == (0, True)
+
+
+@pytest.mark.wide
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes of six axes")
+@pytest.mark.parametrize("name", RUNS)
+def test_39_minutes_without_a_fault(name):
+    assert false_alarms(name, 120.0)[0] == 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", RUNS)
+def test_39_an_hour_without_a_fault(name):
+    faults, motions = false_alarms(name, 3600.0)
+    assert (faults, motions > 300) == (0, True)

@@ -75,7 +75,8 @@ def _put(table: Any, path: list[str], value: float) -> Any:
     if isinstance(table, dict):
         held = cast("dict[str, Any]", table)
         return held | {first: _put(held[first], rest, value) if rest else value}
-    name = next(name for name, field in type(table).model_fields.items() if file_key(name, field) == first)
+    model = cast("type[Table]", type(table))
+    name = next(name for name, field in model.model_fields.items() if file_key(name, field) == first)
     return table.model_copy(update={name: _put(getattr(table, name), rest, value) if rest else value})
 
 

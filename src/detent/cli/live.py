@@ -30,7 +30,7 @@ PLAIN = "Serve the panel without TLS on a network; whoever is on it can then rea
 VIEWER = "Print a second link, for somebody who only looks, and may stop."
 WORD = (
     "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home; of the position "
-    "table: positions, teach, edit, rename, forget, undo, redo, export, import; link: to the panel."
+    "table: positions, teach, edit, rename, forget, undo, redo, export, import; inject, faults; link: to the panel."
 )
 
 
@@ -194,6 +194,7 @@ def connect(
 ) -> None:
     """Ask an axis that runs live for something, and wait until that has ended."""
     from detent.operate.channel import channel_of
+    from detent.operate.faults import describe_fault
     from detent.operate.start import connect as connect_to
     from detent.operate.words import PLACES, describe_status
     from detent.panel.keys import keys_of, link_of
@@ -208,15 +209,18 @@ def connect(
             raise DetentError('connect: a jog needs a velocity such as "20 mm/s"')
         with axis.jog(value):
             threading.Event().wait(seconds)
-    elif word not in ("status", "positions"):
+    elif word not in ("status", "positions", "faults"):
         ended = axis.do(word, _about(word, value, second), speed, wait=False).wait().to_dict()
     if word in ("positions", *PLACES):
         _show_positions(axis.positions, axis.unit, as_json=as_json)
         return
-    status = axis.status
+    status, faults = axis.status, axis.faults if word == "faults" else []
     if as_json:
-        print_json({"status": status, "ended": ended, "why_not_moving": axis.why_not_moving})
+        found = {"faults": faults} if word == "faults" else {}
+        print_json({"status": status, "ended": ended, "why_not_moving": axis.why_not_moving} | found)
         return
+    for one in faults:
+        tell(describe_fault(one))
     tell(describe_status(status, axis.unit))
     for what, remedy in axis.why_not_moving:
         tell(f"  not moving: {what}; {remedy}")

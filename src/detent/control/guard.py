@@ -17,7 +17,7 @@ from detent.kernel.step import hot_step, step
 
 STUCK, JUMPED, REVERSED = 2, 3, 4
 FOLLOWING, SATURATED, OVERSPEED, NO_ARRIVAL = 10, 11, 12, 13
-TRAVEL = 32
+TRAVEL, NO_NUMBER = 32, 52
 
 JUMPS = 2  # jumps of the sensor that are a fault: one alone may be a disturbance of its line
 FAST = 2  # samples in a row beyond the largest speed that are a fault
@@ -33,6 +33,7 @@ class GuardParams(Registers):
     saturated: i4 = register("samples with the command at its limit until that is a fault", unit="count")
     stuck: i4 = register("samples at rest under effort that breaks it loose until that is a fault", unit="count")
     reversed: i4 = register("samples of such an effort in which the axis may speed up against it", unit="count")
+    softly: i8 = register("faults at which the drive goes on, for somebody brings the axis to rest: a bit per number")
 
 
 class Conduct(Registers):
@@ -51,7 +52,10 @@ class Guard(Registers):
     """What is wrong, and for how many samples in a row."""
 
     code: u1 = register("first fault since the axis was enabled, by its number; 0 none", unit="code")
+    hard: u1 = register("first of them that switches off, 0 none", unit="code")
     side: i1 = register("of a fault of the travel: the end that was passed, -1 lower, 1 upper")
+    fresh: u1 = register("1 until the first sample after the axis was enabled")
+    beyond: i1 = register("end of the travel that it was beyond then, and has been ever since")
     following: i4 = register("samples with too large a following error", unit="count")
     saturated: i4 = register("samples with the command at its limit", unit="count")
     stuck: i4 = register("samples at rest under effort", unit="count")
@@ -93,9 +97,10 @@ def note_conduct(c: Conduct, limited: int, moved: int) -> None:
 @step
 def enable_guard(g: Guard) -> None:
     """Forget the last fault and what led to it: the axis is enabled."""
-    g.code = g.side = g.push = g.pushed = 0
+    g.code = g.hard = g.side = g.push = g.pushed = 0
     g.following = g.saturated = g.stuck = g.fast = g.jumps = 0
     g.awaited = g.moved = g.against = g.proven = 0
+    g.fresh, g.beyond = 1, 0
     g.effort = 0.0
 
 
@@ -114,10 +119,12 @@ def lasting(wrong: int, before: int) -> int:
 
 
 @hot_step
-def trip(g: Guard, code: int) -> None:
+def trip(p: GuardParams, g: Guard, code: int) -> None:
     """A fault: the first one stays, what follows is its consequence. A late arrival is none, and gives way to one."""
     if g.code in (0, NO_ARRIVAL):
         g.code = code
+    if p.softly >> code & 1 == 0 and g.hard == 0:
+        g.hard = code
 
 
 @hot_step
@@ -151,7 +158,7 @@ def watch_effort(p: GuardParams, g: Guard, pushing: int, moved: int) -> None:
     """Sensor stuck or the wrong way round, by what the effort makes of the movement."""
     g.stuck = lasting(pushing != 0 and moved == 0, g.stuck)
     if 0 < p.stuck <= g.stuck:
-        trip(g, STUCK)
+        trip(p, g, STUCK)
     if pushing == 0 or pushing != g.push or g.pushed == 0:
         g.push = pushing
         g.pushed = 1 if pushing else 0
@@ -161,7 +168,7 @@ def watch_effort(p: GuardParams, g: Guard, pushing: int, moved: int) -> None:
     if 0 < p.reversed <= g.pushed:
         gained = pushing * (moved - g.began)
         if pushing * moved < 0 and gained < -1 and not is_driven(g, moved):
-            trip(g, REVERSED)
+            trip(p, g, REVERSED)
         if pushing * moved > 0 and gained > 1 and g.effort != 0.0:
             g.proven = 1
         g.pushed = 0
@@ -173,35 +180,49 @@ def watch_speed(p: GuardParams, g: Guard, moved: int) -> None:
     fast = 0 < p.speed < abs(moved)
     g.fast = lasting(fast, g.fast)
     if g.fast >= FAST:
-        trip(g, OVERSPEED)
+        trip(p, g, OVERSPEED)
     elif 0 < p.jump < abs(moved):
         g.jumps += 1
         if g.jumps >= JUMPS:
-            trip(g, JUMPED)
+            trip(p, g, JUMPED)
 
 
 @step
 def watch(p: GuardParams, g: Guard, late: int, side: int, limited: int, pushing: int, moved: int) -> int:
     """One sample; returns the code of the fault that switches off, 0 while there is none.
 
-    `late`: 1 while the following error is beyond its largest; `side`: -1 or 1 beyond the lower or upper end of the
+    `late`: 1 while the following error is beyond its largest, 2 beyond twice that: it grows, and nothing steers any
+    more; `side`: -1 or 1 beyond the lower or upper end of the
     travel; `limited`: 1 while the command is at its limit; `pushing`: direction of an effort that breaks the axis
     loose, else 0; `moved`: counts since the last sample.
     """
     g.following = lasting(late, g.following)
     if 0 < p.following <= g.following:
-        trip(g, FOLLOWING)
-    if p.travel and side:
-        trip(g, TRAVEL)
+        trip(p, g, FOLLOWING)
+        if late > 1 and g.hard == 0:
+            g.hard = FOLLOWING
+    if g.fresh:  # beyond an end from the start, it may come back from there
+        g.fresh, g.beyond = 0, side if p.softly else 0
+    elif side != g.beyond:
+        g.beyond = 0
+    if p.travel and side and side != g.beyond:
+        trip(p, g, TRAVEL)
         if g.code == TRAVEL and g.side == 0:
             g.side = side
     g.saturated = lasting(limited, g.saturated)
     if 0 < p.saturated <= g.saturated:
-        trip(g, SATURATED)
+        trip(p, g, SATURATED)
     note_conduct(g.conduct, limited, moved)
     watch_effort(p, g, pushing, moved)
     watch_speed(p, g, moved)
-    return 0 if g.code == NO_ARRIVAL else g.code
+    return g.hard
+
+
+@hot_step
+def watch_number(p: GuardParams, g: Guard, value: float) -> None:
+    """What is no number, or infinite, comes from a sensor or a law that has gone wrong, and steers nothing."""
+    if not abs(value) < 1e300:
+        trip(p, g, NO_NUMBER)
 
 
 @hot_step
@@ -210,5 +231,6 @@ def is_overdue(g: Guard) -> bool:
     g.awaited -= 1
     if g.awaited:
         return False
-    trip(g, NO_ARRIVAL)
+    if g.code == 0:
+        g.code = NO_ARRIVAL
     return True

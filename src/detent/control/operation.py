@@ -24,6 +24,7 @@ from detent.control.axis_states import (
     SWITCH_ON_DISABLED,
     ordered,
 )
+from detent.control.reaction import LETS_GO, LOSES, is_among
 from detent.kernel.compiled import bits_of
 from detent.kernel.registers import Registers, block, f8, i2_array, i8, i8_array, register, u1, u1_array, u2
 from detent.kernel.step import hot_step, step
@@ -46,7 +47,7 @@ ENDINGS = ("", "done", "aborted", "refused", "failed")
 
 # ---- why it was refused, or failed; below 100 as in the table of faults, `errors.REFUSAL_TEXT`
 NOT_ENABLED, IN_FAULT, NO_FAULT, UNKNOWN, NOT_OFFERED, MOVING, BUSY, UNREADY, NO_JOB, NOT_CONFIRMED = range(101, 111)
-BEYOND, UNREFERENCED, LEASE_LOST, SECOND, STALE, NOT_FINITE = 31, 35, 41, 43, 44, 52
+NOT_SETTLED, BEYOND, UNREFERENCED, LEASE_LOST, SECOND, STALE, NOT_FINITE = 13, 31, 35, 41, 43, 44, 52
 
 # ---- trust in the position
 NOT_KNOWN, RESTORED, REFERENCED = range(3)
@@ -77,6 +78,7 @@ class OperationParams(Registers):
 
     window_looks: i8 = register("looks inside the window until a command is done", unit="count")
     lease_looks: i8 = register("looks that a jog lives without being kept", unit="count")
+    settle_looks: i8 = register("looks at rest outside the window that are a fault; 0 never", unit="count")
     lowest: f8 = register("lower soft limit", unit="m")
     highest: f8 = register("upper soft limit", unit="m")
     endless: u1 = register("1: it turns for ever, and has no limits")
@@ -115,7 +117,8 @@ class Answer(Registers):
     near: u1 = register("1 while the position is in the window")
     ready: u1 = register("1 once it can be enabled")
     limited: u1 = register("1 while the command is at its limit")
-    fault: u2 = register("fault of its guard, 0 none", unit="code")
+    fault: u2 = register("fault that has taken its torque away, 0 none", unit="code")
+    soft: u2 = register("fault of its guard at which the drive goes on, 0 none", unit="code")
     refused: u2 = register("why it does not do what it was told, 0 it does", unit="code")
 
 
@@ -137,6 +140,7 @@ class Operation(Registers):
     running: i8 = register("id of the command that is under way, 0 none", unit="code")
     kind: u1 = register("what it is", unit="code")
     within: i8 = register("looks in the window, the commanded point at rest", unit="count")
+    outside: i8 = register("looks outside it, the commanded point at rest", unit="count")
     lease: i8 = register("looks until an unkept jog is stopped", unit="count")
     client: i8 = register("who commands, 0 nobody", unit="code")
     fault: u2 = register("first fault since the last reset, 0 none", unit="code")
@@ -175,7 +179,7 @@ def end_running(o: Operation, how: int, why: int, by: int) -> None:
     if o.running:
         end(o, o.running, how, why, by)
     o.running = o.kind = 0
-    o.within = o.lease = 0
+    o.within = o.outside = o.lease = 0
 
 
 @hot_step
@@ -226,9 +230,17 @@ def fail(o: Operation, code: int) -> None:
     """A fault: the first one stays, the command ends, the method has taken its torque away or is told to."""
     if o.fault == 0:
         o.fault = code
+    doubt(o, code)
     end_running(o, FAILED, code, 0)
     o.state = FAULT_REACTION
     leave_torque(o)
+
+
+@hot_step
+def doubt(o: Operation, code: int) -> None:
+    """After some faults nobody knows any more where the axis is."""
+    if is_among(code, LOSES):
+        o.trust = NOT_KNOWN
 
 
 @step
@@ -236,6 +248,7 @@ def fail_softly(o: Operation, code: int) -> None:
     """A fault that leaves the loop able to steer: the commanded point comes to rest, and is held."""
     if o.state in (ENABLED, QUICK_STOP):
         o.fault, o.softly = code, 1
+        doubt(o, code)
         end_running(o, FAILED, code, 0)
         o.state = FAULT_REACTION
         halt(o)
@@ -366,7 +379,7 @@ def begin_motion(q: OperationParams, o: Operation, r: Request) -> None:
     if not (r.kind == JOG and o.kind == JOG and o.running == r.id):
         end_running(o, ABORTED, 0, r.id)
     o.client, o.running, o.kind = r.client, r.id, r.kind
-    o.within = o.halted = 0
+    o.within = o.outside = o.halted = 0
     d = o.demand
     d.share = allowed_share(q, o, r.speed)
     if r.kind == JOG:
@@ -487,7 +500,9 @@ def look(o: Operation) -> None:
         o.state = SWITCH_ON_DISABLED
     if o.state == FAULT_REACTION and (o.softly == 0 or a.rests):
         o.state = FAULT
-    if a.fault and o.state != FAULT:
+        if o.softly and is_among(o.fault, LETS_GO):
+            leave_torque(o)
+    if a.fault and (o.state != FAULT or o.softly):  # its torque has gone, also from where a ramp has led to
         fail(o, a.fault)
     if o.kind == JOG and o.lease > 0:
         o.lease -= 1
@@ -503,6 +518,8 @@ def judge(q: OperationParams, o: Operation) -> None:
     if a.refused:  # in the look in which it was told, or later: a controller may need time to find out
         end_running(o, REFUSED, a.refused, 0)
     d.fresh = d.edited = 0
+    if a.soft:
+        fail_softly(o, a.soft)
     if not a.rests:
         o.within = 0
         return
@@ -513,8 +530,11 @@ def judge(q: OperationParams, o: Operation) -> None:
         end_running(o, DONE, 0, 0)
     if o.running and not (o.kind == JOG and d.velocity != 0.0):
         o.within = o.within + 1 if a.near else 0
+        o.outside = 0 if a.near else o.outside + 1
         if o.within >= q.window_looks:
             end_running(o, DONE, 0, 0)
+        elif 0 < q.settle_looks <= o.outside:
+            fail_softly(o, NOT_SETTLED)
 
 
 @step

@@ -28,6 +28,7 @@ _TICKS: dict[type[Registers], tuple[Callable[..., Any], str]] = {}
 
 _SERVES: dict[type[Registers], Callable[..., Any]] = {}
 _CONTROLS: dict[type[Registers], Callable[..., Any]] = {}
+_DISTURBS: dict[type[Registers], Callable[..., Any]] = {}
 
 
 def ticks(params: type[Registers], local: str = "") -> Callable[[F], F]:
@@ -56,6 +57,20 @@ def controls(params: type[Registers]) -> Callable[[F], F]:
     def register(function: F) -> F:
         """Keep it for this class of parameters."""
         _CONTROLS[params] = function
+        return function
+
+    return register
+
+
+def disturbs(params: type[Registers]) -> Callable[[F], F]:
+    """State the tick of a system while a fault is injected: ``tick(params, state, injection, *feed)``.
+
+    It is the tick in the same order, with something between machine and wires, and works on no copy of a block.
+    """
+
+    def register(function: F) -> F:
+        """Keep it for this class of parameters."""
+        _DISTURBS[params] = function
         return function
 
     return register
@@ -136,6 +151,27 @@ def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 
         return n
 
     return on_a_copy if local else plain
+
+
+def run_disturbed(p: Any, r: Any, f: Any, most: int, *feed: Any) -> int:
+    """The same as `run_stretch` while a fault is injected."""
+    tick, n = _DISTURBS[type(p)], 0
+    while n < most and tick(p, r, f, *feed):
+        n += 1
+    return n
+
+
+@extending.overload(run_disturbed)
+def _run_disturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 - as above
+    tick = _DISTURBS[p.registers]
+
+    def compiled(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> int:
+        n = 0
+        while n < most and tick(p, r, f, *feed):
+            n += 1
+        return n
+
+    return compiled
 
 
 def lay_ready(values: NDArray[Any]) -> HostArray:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from detent.methods.position import PositionSensor
     from detent.methods.tuning import Tuning
     from detent.page.frame import Comparison, Page
+    from detent.plant.injection import Place
     from detent.record.capture import Clocking
     from detent.record.machine import AnyRecorder, Progress
     from detent.record.run import Level
@@ -118,6 +119,12 @@ class Live:
     """Places for pieces of a job in what the loop shares, a row each; None where it does no jobs."""
     numbers: frozenset[int] | None = None  # of positions that the method itself knows; None where it knows none
     work: "Callable[[Any], Work] | None" = None  # a job as pieces for the tray
+    places: "Mapping[str, Place]" = field(default_factory=dict[str, Any])
+    """Where faults can be injected; nowhere where the machine is none that is simulated."""
+    limits: Mapping[int, float] = field(default_factory=dict[int, float])
+    """What its guard compares with, by the number of the fault, in the unit of what is compared."""
+    fault_numbers: Mapping[int, int] = field(default_factory=dict[int, int])
+    """Number in the table of faults of those that the method numbers by itself."""
 
 
 class Work(Protocol):

@@ -41,6 +41,7 @@ QUESTIONS: dict[str, Callable[..., Any]] = {
     "scope": Session.scope,
     "axis": Session.axis,
     "positions": Session.positions,
+    "faults": Session.faults,
 }
 """What only reads: the method of `Session` that answers; what else stands in the message are its arguments."""
 
@@ -343,6 +344,10 @@ class Connection:
     def positions(self) -> list[dict[str, Any]]:
         """The position table."""
         return self._request({"do": "positions"})["positions"]
+
+    def faults(self) -> list[dict[str, Any]]:
+        """The last faults."""
+        return self._request({"do": "faults"})["faults"]
 
     def ask(self, word: str, value: object = None, speed: float = 1.0) -> int:
         """Ask for something; gives an id."""

@@ -34,6 +34,10 @@ class Link(Protocol):
         """The position table."""
         ...
 
+    def faults(self) -> list[dict[str, Any]]:
+        """The last faults."""
+        ...
+
     def ask(self, word: str, value: object = None, speed: float = 1.0) -> int:
         """Ask for something; gives an id."""
         ...
@@ -130,6 +134,11 @@ class LiveAxis:
         """Every condition of a motion that is not met, and what to do about it."""
         return why_not_moving(self.status)
 
+    @property
+    def faults(self) -> list[dict[str, Any]]:
+        """The last faults, each with sentence, value, limit, causes and what to do."""
+        return self.link.faults()
+
     def telemetry(self, rate: float = 25.0) -> Iterator[Telemetry]:
         """The axis again and again, `rate` times a second, without end."""
         pause = threading.Event()
@@ -169,6 +178,10 @@ class LiveAxis:
     def reset(self, *, wait: bool = True) -> Command:
         """Leave a fault; never moves."""
         return self.do("reset", wait=wait)
+
+    def inject(self, fault: str, *, wait: bool = True) -> Command:
+        """A fault into a simulated machine, such as "encoder stuck"; "nothing" ends it."""
+        return self.do("inject", fault, wait=wait)
 
     def confirm(self, *, wait: bool = True) -> Command:
         """The first motion since enabling went as expected: full speed from now on."""

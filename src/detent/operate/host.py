@@ -19,6 +19,7 @@ from detent.control.axis_states import STATE_NAMES
 from detent.control.operation import ENDS, OperationParams
 from detent.errors import NO_MARK, DetentError
 from detent.methods.method import Live, Method, Work
+from detent.operate.faults import Faults
 from detent.operate.keeper import Keeper
 from detent.operate.loop import INBOX, PULLS, Board, run_loop
 from detent.operate.realtime import ask_for_time, give_back
@@ -29,6 +30,7 @@ PERIOD = 1e-3  # of the loop [s]
 LEASE = 0.2  # time that a jog lives without being kept [s]
 LEAST_WINDOW = 0.02  # shortest time in the window until a command is done [s]
 KEPT = 2048  # endings, and in wall time requests, that memory holds
+SETTLE = 2.0  # time that an axis may be outside its window at the end of a motion [s]
 REST = 10.0  # time that an axis is given to come to rest before its loop ends [s]
 
 
@@ -110,8 +112,9 @@ def operation_params(**more: Any) -> Any:
         looks = math.ceil(max(window, LEAST_WINDOW) / look - 1e-9)
         lease = math.floor(LEASE / look + 1e-9)
         return OperationParams(
-            window_looks=looks, lease_looks=lease, lowest=limits[0], highest=limits[1], takes=takes, creep=0.1, **more
-        )
+            window_looks=looks, lease_looks=lease, settle_looks=math.ceil(SETTLE / look), lowest=limits[0],
+            highest=limits[1], takes=takes, creep=0.1, **more
+        )  # fmt: skip
 
     return make
 
@@ -133,8 +136,9 @@ class Host:
         loop = self.board.loop
         loop.period, loop.ticks, loop.wall = round(period * 1e9), period * speed / self.axis.tick, int(wall)
         self.board.operation.trust = ops.REFERENCED
+        self.board.simulated = int(bool(self.axis.places))
         self.scope = Scope(self.board, type(self.axis.state), channels)
-        self.log = Log()
+        self.log, self.faults = Log(), Faults(self)
         self._ids = self._read = self._noted = self._pulls = 0
         self._thread: threading.Thread | None = None
         self.keeper: Keeper | None = None
@@ -148,9 +152,12 @@ class Host:
     # ---- the loop
 
     def run(self, periods: int) -> int:
-        """Run periods in this thread."""
-        done = self._run(periods)
+        """Run periods in this thread, taking note before the ring has come round."""
+        done = self._run(min(periods, self.scope.size // 3))
         self.note()
+        while 0 < done < periods and self.board.loop.leave == 0:
+            done += self._run(min(periods - done, self.scope.size // 3))
+            self.note()
         if self.keeper is not None:
             self.keeper.look()
         return done
@@ -315,6 +322,7 @@ class Host:
             self._ended[ending.id] = ending
         while len(self._ended) > KEPT:
             self._forgotten = self._ended.pop(next(iter(self._ended))).id
+        self.faults.note()
         self._feed()
 
     def _new_endings(self) -> Iterator[Ending]:

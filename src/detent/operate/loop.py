@@ -13,8 +13,13 @@ import math
 from typing import Any
 
 from detent.control.operation import (
+    DONE,
+    NEEDS_ID,
+    NOT_FINITE,
+    REFUSED,
     Operation,
     Request,
+    end,
     fail_softly,
     judge,
     look,
@@ -27,10 +32,11 @@ from detent.control.operation import (
 from detent.errors import LOOP_DEAD, LOOP_OVERRUN
 from detent.kernel.clock import monotonic_ns, sleep_until
 from detent.kernel.compiled import byte_at
-from detent.kernel.loop import Bytes, Offsets, run_serve, run_stretch
+from detent.kernel.loop import Bytes, Offsets, run_disturbed, run_serve, run_stretch
 from detent.kernel.registers import Registers, block, f8, f8_array, i8, i8_array, register, u1
 from detent.kernel.step import step
 from detent.operate.wires import Wires, give_lines, take_lines
+from detent.plant.injection import Injection, begin_injection
 
 INBOX = 1024  # requests that wait at most
 AT_ONCE = 64  # of them that are taken in a period
@@ -39,6 +45,10 @@ BINS = 32  # of the histogram of lateness: bin k holds 2^(k-1) to 2^k us, bin 0 
 SECOND = 1_000_000_000
 MOST_OVERRUNS = 3  # in a second; one more is a fault
 LONGEST = 5  # periods that one overrun may last; a longer one is a fault
+INJECT = (
+    256  # kinds of requests from here on are for a simulated machine: the place times 16, and what goes wrong there
+)
+NOTES = 16  # faults whose first moment is kept until the host has read it
 
 
 class Inbox(Registers):
@@ -90,6 +100,22 @@ class Loop(Registers):
     died: i8 = register("times that the loop has stood for too long", unit="count")
 
 
+class FaultNotes(Registers):
+    """How the axis was in the period in which each of the last faults began."""
+
+    count: i8 = register("faults so far", unit="count")
+    present: i8 = register("the one that stands, 0 none", unit="code")
+    code: i8_array = register("of each", length=NOTES, unit="code")
+    row: i8_array = register("rows of the ring written before", length=NOTES, unit="count")
+    period: i8_array = register("period of the loop", length=NOTES, unit="count")
+    position: f8_array = register("as its sensor showed it", length=NOTES, unit="m")
+    velocity: f8_array = register("as its sensor showed it", length=NOTES, unit="m/s")
+    error: f8_array = register("commanded point less position", length=NOTES, unit="m")
+    driven: f8 = register("command to the actuator over its limit in the last period", unit="1")
+    effort: f8_array = register("that in the period before the fault", length=NOTES, unit="1")
+    trust: i8_array = register("in the position afterwards", length=NOTES, unit="code")
+
+
 class Board(Registers):
     """All that the loop shares with those around it."""
 
@@ -98,6 +124,9 @@ class Board(Registers):
     inbox: Inbox = block("mailbox")
     request: Request = block("the request that is being taken")
     wires: Wires = block("lines that a driver holds")
+    simulated: u1 = register("1 where the machine is simulated, and faults can be injected")
+    injection: Injection = block("fault between machine and wires")
+    faults: FaultNotes = block("faults so far")
 
 
 @step
@@ -114,7 +143,37 @@ def take_requests(q: Any, b: Board) -> None:
             o.torn += 1
             return
         box.period[k] = b.loop.periods
-        obey(q.operation, o, r)
+        if r.kind >= INJECT and b.simulated:
+            inject(b)
+        else:
+            obey(q.operation, o, r)
+
+
+@step
+def inject(b: Board) -> None:
+    """Something goes wrong between machine and wires, or nothing any more; the controller is not asked."""
+    r, o = b.request, b.operation
+    o.taken += 1
+    if not abs(r.value) < 1e12 or r.id < NEEDS_ID:
+        end(o, r.id, REFUSED, NOT_FINITE, 0)
+        return
+    begin_injection(b.injection, r.kind - INJECT >> 4, r.kind - INJECT & 15, r.value)
+    end(o, r.id, DONE, 0, 0)
+
+
+@step
+def note_fault(b: Board) -> None:
+    """How the axis is where a fault begins; the first one stays until it is reset."""
+    o, a, n = b.operation, b.operation.answer, b.faults
+    if n.present == o.fault:
+        n.driven = a.effort
+        return
+    n.present = o.fault
+    if o.fault:
+        k = n.count % NOTES
+        n.code[k], n.row[k], n.period[k], n.trust[k] = o.fault, b.loop.rows, b.loop.periods, o.trust
+        n.position[k], n.velocity[k], n.error[k], n.effort[k] = a.position, a.velocity, a.error, n.driven
+        n.count += 1
 
 
 @step
@@ -166,12 +225,14 @@ def run_period(p: Any, r: Any, q: Any, memory: Any, b: Board, *feed: Any) -> Non
         if r.tick >= loop.look:
             loop.look = r.tick + q.look_ticks
             look_once(p, r, q, memory, b, *feed)
-        n = run_stretch(p, r, min(due, loop.look) - r.tick, *feed)
+        most = min(due, loop.look) - r.tick
+        n = run_disturbed(p, r, b.injection, most, *feed) if b.injection.place else run_stretch(p, r, most, *feed)
         waited = 0 if n > 0 else waited + 1
         if n == 0:  # it waits for its host
             look_once(p, r, q, memory, b, *feed)
     if waited == 2:
         loop.stalls += 1
+    note_fault(b)
 
 
 @step

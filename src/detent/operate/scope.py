@@ -4,6 +4,7 @@ The loop writes a row and then counts it; it never waits for a reader. A reader 
 again: what the loop may have overwritten meanwhile is dropped, and how much was missed is said.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -15,7 +16,8 @@ from detent.kernel.registers import Leaf, Registers
 from detent.operate.loop import Board
 from detent.record.recorder import byte_places, choose_leaves
 
-ROWS = 8192  # of the ring, 8 s at 1 kHz
+ROWS = 8192  # of the ring at least, 8 s at 1 kHz
+HELD = 6.0  # time that the ring holds at least [s]
 CHANNELS = 8
 SPARE = 64  # rows behind the loop's that a reader leaves alone: it may be writing them
 SHOWN = (
@@ -40,7 +42,8 @@ class Scope:
         self._board, self._registers = board, registers
         self.of_board = byte_places(_FIXED)
         self.of_axis = np.zeros(8 * CHANNELS, np.int64)
-        self.ring = np.zeros((ROWS, len(self.of_board) + len(self.of_axis)), np.uint8)
+        self.size = max(ROWS, math.ceil(HELD * 1e9 / board.loop.period))
+        self.ring = np.zeros((self.size, len(self.of_board) + len(self.of_axis)), np.uint8)
         self._places: list[Leaf | None] = [None] * CHANNELS
         self._since = [0] * CHANNELS  # first row that holds what stands in a place
         self._wanted: dict[int, list[Leaf]] = {}  # registers of the axis, by who watches them
@@ -105,11 +108,10 @@ class Scope:
         They begin where the ring holds the channels asked for, or all that are watched.
         """
         row, written = self.row, self._written
-        first = min(
-            max(after, written - ROWS + SPARE, self.begin(row.names if channels is None else channels)), written
-        )
-        copied = self.ring[np.arange(first, written) % ROWS]
-        lowest = self._written - ROWS + 1  # the loop may be writing this one by now
+        begin = self.begin(row.names if channels is None else channels)
+        first = min(max(after, written - self.size + SPARE, begin), written)
+        copied = self.ring[np.arange(first, written) % self.size]
+        lowest = self._written - self.size + 1  # the loop may be writing this one by now
         kept = copied[max(0, lowest - first) :]
         return kept.view(row)[:, 0], written, max(first, lowest) - after
 

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from detent.control import operation as ops
 from detent.errors import NO_MARK, DetentError
+from detent.operate.faults import injection_of, injections
 from detent.operate.host import Host
 from detent.operate.loop import Board
 from detent.operate.places import Places
@@ -18,6 +19,7 @@ STEP = 2e-3  # how often an ending is looked for [s]
 LINES = ("stop", "disable")  # never refused
 MOST_ROWS = 2048  # of the ring, in one answer
 LARGEST = 1 << 62  # number of a row
+NOTE = 0.5  # how often what nobody asks for is taken down [s]
 
 
 class Session:
@@ -26,20 +28,31 @@ class Session:
     def __init__(self, host: Host, about: Mapping[str, Any], file: Mapping[str, Any] | None = None) -> None:
         self.host, self.about, self._file = host, dict(about), dict(file or {})
         self.unit = host.axis.unit
-        self._lock, self._places = threading.Lock(), Places(host)
+        self._lock, self._left, self._places = threading.Lock(), threading.Event(), Places(host)
         self._signals = self._name_signals()
+        if host.is_running:
+            threading.Thread(target=self._keep_noting, name="notes", daemon=True).start()
+
+    def _keep_noting(self) -> None:
+        """Take note of faults, and of what came from outside, before the loop's memory of it has come round."""
+        while not self._left.wait(NOTE):
+            with self._lock:
+                self.host.note()
 
     def describe(self) -> dict[str, Any]:
-        """What does not change: name, method, unit, period, commands, what the scope can show."""
+        """What does not change: name, method, unit, period, commands, what the scope can show, what can go wrong."""
         words = [word for word, (kind, *_) in WORDS.items() if self._takes(kind)]
         if self.host.keeper is not None:
             words += [word for word in ("go_to", *PLACES) if word not in words]
+        can_inject = injections(self.host.axis.places)
+        words += ["inject"] if can_inject and "inject" not in words else []
         q = self.host.axis.live.operation
         limits = None if q.endless else [q.lowest, q.highest]
         period = self.host.board.loop.period * 1e-9
         channels = [{"name": name, "unit": unit, "help": help_} for name, (_, unit, help_) in self._signals.items()]
         return self.about | {
             "unit": self.unit, "period": period, "commands": words, "limits": limits, "channels": channels,
+            "injections": can_inject,
         }  # fmt: skip
 
     def status(self) -> dict[str, Any]:
@@ -64,15 +77,31 @@ class Session:
             self.host.stop()
         if word == "disable":
             self.host.off()
-        about = value_of(WORDS[word], value, self.unit)
+        kind = WORDS[word].kind
+        if word == "inject":
+            kind, about = injection_of(self.host.axis.places, value)
+        else:
+            about = value_of(WORDS[word], value, self.unit)
         with self._lock:
             self.host.note()  # of what nobody waits for, too: the loop keeps the last endings only
         try:
-            return self.host.ask(WORDS[word].kind, about, speed, client=client, **more)  # may wait for the disk
+            return self.host.ask(kind, about, speed, client=client, **more)  # may wait for the disk
         except BlockingIOError:
             if word not in LINES:
                 raise
             return self.host.settle(0)  # its line has done it
+
+    def faults(self) -> list[dict[str, Any]]:
+        """The last faults, the first of them first."""
+        with self._lock:
+            self.host.note()
+            return [one.to_dict() for one in self.host.faults.records]
+
+    def fault_trace(self, number: int) -> dict[str, list[float]]:
+        """Columns of the ring from 2 s before to 2 s after a fault."""
+        with self._lock:
+            self.host.note()
+            return self.host.faults.trace(number)
 
     def positions(self) -> list[dict[str, Any]]:
         """The position table: number, name, position, counts, tolerance, taught and used of each; SI units."""
@@ -125,6 +154,7 @@ class Session:
 
     def close(self) -> None:
         """Come to rest, take the torque away, end the loop."""
+        self._left.set()
         self.host.close()
 
     def axis(self) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from detent.control import operation as ops
 from detent.control.axis_states import STATE_NAMES
 from detent.errors import REFUSAL_TEXT, AxisError, DetentError
+from detent.operate.loop import INJECT
 from detent.units import format_quantity, parse_quantity
 
 TRUSTS = ("unknown", "restored", "referenced")
@@ -35,6 +36,7 @@ WORDS = {
     "take": Word(ops.TAKE, help="take over the command; a motion under way is stopped first"),
     "trust": Word(ops.TRUST, "number", "0 position unknown, 1 restored, 2 referenced"),
     "leave": Word(ops.LEAVE, help="command no longer; a motion under way is stopped"),
+    "inject": Word(INJECT, "fault", help="a fault into the simulated machine, or nothing any more"),
     "order": Word(ops.ORDER, "number", "an order of the control word of CiA 402, 0 shutdown to 6 fault reset"),
 }
 

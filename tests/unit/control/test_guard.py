@@ -1,9 +1,12 @@
+import math
+
 import pytest
 
 from detent.control.guard import (
     FOLLOWING,
     JUMPED,
     NO_ARRIVAL,
+    NO_NUMBER,
     OVERSPEED,
     REVERSED,
     SATURATED,
@@ -15,8 +18,10 @@ from detent.control.guard import (
     enable_guard,
     is_overdue,
     watch,
+    watch_number,
     weigh_effort,
 )
+from detent.control.reaction import SOFT
 from detent.errors import GUARD_TEXT
 
 WATCHES = {"speed": 11, "jump": 15, "travel": 1, "following": 3, "saturated": 4, "stuck": 5, "reversed": 6}
@@ -150,5 +155,45 @@ def test_a_late_arrival_switches_nothing_off_and_gives_way_to_what_does():
 
 def test_every_fault_has_its_text():
     assert set(GUARD_TEXT) == {
-        STUCK, JUMPED, REVERSED, FOLLOWING, SATURATED, OVERSPEED, NO_ARRIVAL, TRAVEL
+        STUCK, JUMPED, REVERSED, FOLLOWING, SATURATED, OVERSPEED, NO_ARRIVAL, TRAVEL, NO_NUMBER
     }  # fmt: skip
+
+
+def test_where_somebody_brings_it_to_rest_a_fault_leaves_the_drive_on_until_a_worse_one():
+    p, g = GuardParams(**WATCHES, softly=SOFT), Guard()
+    assert [watch(p, g, 1, 0, 0, 0, 5) for _ in range(50)] == [0] * 50
+    assert g.code == FOLLOWING
+    assert [watch(p, g, 0, 0, 0, 1, 0) for _ in range(5)] == [0] * 4 + [STUCK]
+    assert g.code == FOLLOWING  # the first cause
+
+
+def test_a_following_error_that_grows_on_switches_off():
+    p, g = GuardParams(**WATCHES, softly=SOFT), Guard()
+    assert [watch(p, g, 2, 0, 0, 0, 5) for _ in range(3)] == [0, 0, FOLLOWING]
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_an_axis_enabled_beyond_an_end_may_come_back_once(side):
+    p, g = GuardParams(**WATCHES, softly=SOFT), Guard()
+    enable_guard(g)
+    assert [watch(p, g, 0, one, 0, 0, 5) for one in (side, side, 0)] == [0, 0, 0]
+    assert g.code == 0
+    watch(p, g, 0, side, 0, 0, 5)
+    assert (g.code, g.side, g.hard) == (TRAVEL, side, 0)
+
+
+def test_it_may_not_leave_by_the_other_end():
+    p, g = GuardParams(**WATCHES, softly=SOFT), Guard()
+    enable_guard(g)
+    watch(p, g, 0, 1, 0, 0, 5)
+    watch(p, g, 0, -1, 0, 0, 5)
+    assert g.code == TRAVEL
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_switches_off_at_once(value):
+    p, g = GuardParams(**WATCHES, softly=SOFT), Guard()
+    watch_number(p, g, 1e9)
+    assert g.code == 0
+    watch_number(p, g, value)
+    assert watch(p, g, 0, 0, 0, 0, 5) == g.code == NO_NUMBER

@@ -20,7 +20,7 @@ from detent.operate.channel import MOST_CLIENTS
 from detent.operate.host import Log, repeat
 from detent.operate.session import Session
 from detent.operate.start import make_host
-from detent.operate.words import CommandError, CommandRefusedError
+from detent.operate.words import CommandError, CommandFailedError, CommandRefusedError
 
 pytestmark = [
     pytest.mark.compiled,
@@ -172,6 +172,48 @@ def test_the_words_of_the_api_block_and_can_be_awaited(folder: Path) -> None:
         assert "operation enabled" in repr(axis)
     with pytest.raises(DetentError, match=r"0\.1 to 10"):
         detent.live(folder / "slide.toml", speed=20.0)
+
+
+def test_a_fault_is_injected_told_and_ended(folder: Path) -> None:
+    with detent.live(folder / "slide.toml", wall=False) as axis:
+        assert "inject" in axis.about["commands"]
+        assert "stuck" in axis.about["injections"]["encoder"]
+        axis.enable()
+        axis.confirm()
+        axis.inject("encoder stuck")
+        with pytest.raises(CommandFailedError, match="sensor did not move"):
+            axis.move_by("5 mm")
+        (fault,) = axis.faults
+        assert (fault["code"], fault["position"]) == ("F02", "lost")
+        axis.inject("nothing")
+        axis.reset()
+        axis.enable()
+        with pytest.raises(CommandRefusedError, match="35"):
+            axis.move_to("20 mm")
+        axis.confirm()
+        axis.move_by("1 mm")
+        trace = axis.link.fault_trace(1)  # type: ignore[attr-defined]
+        assert trace["time"][0] < 0.0 < trace["time"][-1]
+        with pytest.raises(DetentError, match="slide blocked, push"):
+            axis.inject("encoder broken")
+
+
+def test_faults_are_injected_and_read_from_a_second_terminal(folder: Path, running: Running) -> None:
+    file = str(folder / "slide.toml")
+    assert run("connect", file, "inject", "encoder stuck").returncode == 0
+    wrong = run("connect", file, "inject", "nobody")
+    assert (wrong.returncode, "encoder off, stuck" in wrong.stderr) == (2, True)
+    with detent.connect(file) as axis:
+        axis.enable()
+        axis.confirm()
+        with pytest.raises(CommandFailedError):
+            axis.move_by("5 mm")
+    told = run("connect", file, "faults")
+    assert told.returncode == 0
+    assert "F02" in told.stdout
+    (fault,) = json.loads(run("connect", file, "faults", "--json").stdout)["faults"]
+    assert fault["code"] == "F02"
+    running.end()
 
 
 @pytest.mark.parametrize("value", [None, True, "5", "5 V", "x", [1], {}, "nan mm"])

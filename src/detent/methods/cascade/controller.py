@@ -7,7 +7,7 @@ answer.
 
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference
 from detent.control.cascade_law import control as control_law
-from detent.control.guard import Guard, GuardParams, is_overdue, lasting, watch, weigh_effort
+from detent.control.guard import Guard, GuardParams, is_overdue, lasting, watch, watch_number, weigh_effort
 from detent.kernel.loop import HostArray, controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
@@ -120,8 +120,9 @@ def note_peaks(c: CascadeController) -> None:
 
 @step
 def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> int:
-    """One sample of the guard; the code of the fault, 0 for none. What is no number has passed an end too."""
-    late = not abs(c.law.position_error) <= p.limits.following_error
+    """One sample of the guard; the code of the fault that switches off, 0 for none."""
+    error = abs(c.law.position_error)
+    late = (not error <= p.limits.following_error) + (not error <= 2.0 * p.limits.following_error)
     pushing = 0
     if abs(c.law.command) >= p.limits.breaking:
         pushing = 1 if c.law.command > 0.0 else -1
@@ -132,6 +133,7 @@ def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> 
         side = -1
     moved = count - c.count
     c.count = count
+    watch_number(p.guard, c.guard, error)
     weigh_effort(c.guard, c.law.command, moved)
     return watch(p.guard, c.guard, late, side, c.law.limited > 0, pushing, moved)
 

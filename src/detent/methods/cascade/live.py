@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from detent.control.guard import enable_guard
+from detent.control.guard import FOLLOWING, JUMPED, OVERSPEED, SATURATED, STUCK, enable_guard
+from detent.control.guard import TRAVEL as END_OF_TRAVEL
 from detent.control.operation import (
     BEYOND,
     HALT,
@@ -20,11 +21,13 @@ from detent.control.operation import (
     Operation,
     OperationParams,
 )  # fmt: skip
+from detent.control.reaction import SOFT
 from detent.kernel.loop import lay_ready, serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
 from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines
+from detent.methods.cascade.faults import places
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.run import describe_cause
 from detent.methods.cascade.schema import CascadeSpec
@@ -104,13 +107,16 @@ def serve(
     a.rests = 1 if is_at_rest(course) else 0
     a.near = 1 if abs(a.error) <= q.settled else 0
     a.ready = 1
-    a.fault = c.guard.code if c.on == 0 and o.demand.do != REST_OFF else 0
+    driven = o.demand.do != REST_OFF
+    a.fault = c.guard.hard if c.on == 0 and driven else 0
+    a.soft = c.guard.code if c.on and driven else 0
 
 
 def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:
     """The axis at power-on, its drive off, to be operated."""
     host, limits = CascadeHost(spec), motion_limits(spec)
     host.controller.on = 0
+    host.params.controller.guard.softly = SOFT
     q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
     q.settled = host.params.controller.limits.window
     ends = spec.limits.lowest, spec.highest
@@ -127,4 +133,21 @@ def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[s
     def fault() -> str:
         return describe_cause(host) if host.controller.guard.code else ""
 
-    return {"": Live(host.params, host.state, q, memory, host.tick, spec.unit("m"), host.feed, fault)}
+    return {
+        "": Live(
+            host.params, host.state, q, memory, host.tick, spec.unit("m"), host.feed, fault,
+            places=places(spec, host.params, host.period), limits=guard_limits(spec),
+        )
+    }  # fmt: skip
+
+
+def guard_limits(spec: CascadeSpec) -> dict[int, float]:
+    """What the guard compares with, by the number of the fault."""
+    table, speed = spec.protection, max(spec.limits.speed, spec.method.velocity_limit)
+    found = {
+        STUCK: table.stuck_effort,
+        FOLLOWING: spec.method.following_error,
+        SATURATED: 1.0,
+        END_OF_TRAVEL: spec.highest,
+    }
+    return found | {OVERSPEED: table.overspeed * speed, JUMPED: table.jump * speed * spec.method.sample_period}

@@ -191,7 +191,8 @@ class LinearLoop:
         velocity = velocity * _filter(z, self.velocity_share)
         if self.spec.method.structure == "pid":
             velocity = velocity * _filter(z, self.derivative_share)
-        return position, velocity, self.period * z / (z - 1.0)
+        summed: Any = self.period * z / (z - 1.0)
+        return position, velocity, summed
 
     def _driven(self, z: Phasors) -> tuple[Phasors, Phasors]:
         """Both positions of the plant that are read, to what the amplifier puts out; by its modes where they differ."""
@@ -200,7 +201,7 @@ class LinearLoop:
         modes, vectors = np.linalg.eig(held)
         if np.linalg.cond(vectors) < WELL_APART:
             shares = vectors[places] * np.linalg.solve(vectors, driven.astype(np.complex128))
-            found = (1.0 / (z[:, None] - modes)) @ shares.T
+            found: Any = (1.0 / (z[:, None] - modes)) @ shares.T
         else:  # without drag the position sums up what is summed up already
             through = z[:, None, None] * np.eye(len(driven)) - held
             put_in = np.broadcast_to(driven[:, None], (len(z), len(driven), 1)).astype(np.complex128)

@@ -16,7 +16,7 @@ from detent.control.deviation_counter import (
     drive_word,
     watch_ranges,
 )
-from detent.control.guard import Guard, GuardParams, enable_guard, is_overdue, watch
+from detent.control.guard import Guard, GuardParams, enable_guard, is_overdue, watch, watch_number
 from detent.control.pulse_generator import (
     PulseGenerator,
     PulseGeneratorParams,
@@ -305,6 +305,7 @@ def protect(p: FilteredControllerParams, c: FilteredController, lines: FilteredL
     pushing = 1 if lines.word >= p.breaking else -1 if lines.word <= -p.breaking else 0
     side = 1 if d.position > p.highest else -1 if d.position < p.lowest else 0
     limited = 1 if abs(lines.word) >= p.deviation.word_limit else 0
+    watch_number(p.guard, c.guard, lines.word)
     if watch(p.guard, c.guard, 0, side, limited, pushing, moved):
         d.state, d.cause = FAULT, GUARDED
         decide(p, c, lines)

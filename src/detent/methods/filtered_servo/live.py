@@ -4,7 +4,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from detent.control.deviation_counter import FAULT, GUARDED, RESET
+from detent.control.deviation_counter import DEVIATION_RANGE, FAULT, GUARDED, RESET, SPEED_RANGE
+from detent.control.guard import FOLLOWING, JUMPED, OVERSPEED, SATURATED, STUCK
+from detent.control.guard import TRAVEL as END_OF_TRAVEL
 from detent.control.operation import (
     HALT,
     HOLD,
@@ -19,6 +21,7 @@ from detent.control.operation import (
     OperationParams,
 )  # fmt: skip
 from detent.control.pulse_generator import PER_PULSE
+from detent.control.reaction import SOFT
 from detent.kernel.loop import serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
@@ -29,6 +32,7 @@ from detent.methods.filtered_servo.controller import (
     go_to,
     reset,
 )
+from detent.methods.filtered_servo.faults import places
 from detent.methods.filtered_servo.host import FilteredHost
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.method import Live
@@ -112,9 +116,13 @@ def serve(  # noqa: PLR0913 - as all of its kind
     a.rests = 1 if g.command == g.goal else 0
     a.near = 1 if abs(c.deviation.deviation) <= p.window else 0
     a.ready = 1
-    a.fault = 0
-    if c.deviation.state == FAULT and d.do != HOLD:
-        a.fault = c.guard.code if c.deviation.cause == GUARDED else COUNTERS + c.deviation.cause
+    a.fault = a.soft = 0
+    if d.do == REST_OFF or c.deviation.reset:  # what was wrong is forgotten with the next tick
+        return
+    if c.deviation.state != FAULT:
+        a.soft = c.guard.code
+    else:
+        a.fault = c.guard.hard if c.deviation.cause == GUARDED else COUNTERS + c.deviation.cause
 
 
 def live(spec: FilteredServoSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:
@@ -125,4 +133,16 @@ def live(spec: FilteredServoSpec, operation: Callable[..., OperationParams]) -> 
     q.rate = spec.limits.speed / spec.pulse * PER_PULSE
     q.operation = operation(LOOK, spec.method.in_position_time, (0.0, spec.limits.travel), MOVE_TO, MOVE_BY, JOG)
     machine: Any = host.machine
-    return {"": Live(machine.params, machine.state, q, FilteredLive(), machine.tick, fault=lambda: host.failure)}
+    machine.params.controller.guard.softly = SOFT
+    table, speed = spec.protection, spec.limits.speed
+    largest = machine.params.controller.deviation.range * spec.pulse
+    limits = {STUCK: table.stuck_effort, SATURATED: 1.0, OVERSPEED: table.overspeed * speed,
+              JUMPED: table.jump * speed * LOOK, END_OF_TRAVEL: spec.limits.travel,
+              COUNTERS + DEVIATION_RANGE: largest}  # fmt: skip
+    return {
+        "": Live(
+            machine.params, machine.state, q, FilteredLive(), machine.tick, fault=lambda: host.failure,
+            places=places(spec), limits=limits,
+            fault_numbers={COUNTERS + DEVIATION_RANGE: FOLLOWING, COUNTERS + SPEED_RANGE: OVERSPEED},
+        )
+    }  # fmt: skip

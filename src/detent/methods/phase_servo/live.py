@@ -4,14 +4,16 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from detent.control.guard import NO_ARRIVAL
+from detent.control.guard import NO_ARRIVAL, SATURATED, STUCK
 from detent.control.operation import HALT, HOLD, MOVE_BY, MOVE_TO, REST_OFF, TRAVEL, Operation, OperationParams
 from detent.control.phase_sequencer import ACQUIRE, SPEED
+from detent.control.reaction import SOFT
 from detent.kernel.loop import serves
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import step
 from detent.methods.method import Live
 from detent.methods.phase_servo.controller import PhaseController, PhaseControllerParams, PhaseLines, acquire, command
+from detent.methods.phase_servo.faults import places
 from detent.methods.phase_servo.host import PhaseHost
 from detent.methods.phase_servo.schema import PhaseServoSpec
 
@@ -105,7 +107,10 @@ def serve(  # noqa: PLR0913 - as all of its kind
     a.rests = 1 if s.ready and s.strobe == 0 else 0
     a.near = 1 if abs(memory.target - place) <= q.window else 0
     a.ready = 1
-    a.fault = c.guard.code if c.guard.code != NO_ARRIVAL and lines.enable == 0 and d.do != HOLD else 0
+    a.fault = a.soft = 0
+    if d.do != REST_OFF and s.state != ACQUIRE:
+        a.soft = c.guard.code if lines.enable and c.guard.code != NO_ARRIVAL else 0
+        a.fault = c.guard.hard if lines.enable == 0 else 0
 
 
 def live(spec: PhaseServoSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:
@@ -119,5 +124,11 @@ def live(spec: PhaseServoSpec, operation: Callable[..., OperationParams]) -> dic
     q.operation.one_at_a_time = 1
     begin = round((spec.mechanics.start_position - host.home) / spec.step)
     machine: Any = host.machine
+    machine.params.controller.guard.softly = SOFT
     memory = PhaseLive(base=begin, position=begin)
-    return {"": Live(machine.params, machine.state, q, memory, machine.tick, fault=lambda: host.failure)}
+    return {
+        "": Live(
+            machine.params, machine.state, q, memory, machine.tick, fault=lambda: host.failure,
+            places=places(spec, spec.tick), limits={STUCK: spec.protection.stuck_effort, SATURATED: 1.0},
+        )
+    }  # fmt: skip

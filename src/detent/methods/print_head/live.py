@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from detent.control.column_timer import COLUMNS
+from detent.control.guard import SATURATED
 from detent.control.head_commands import ACKNOWLEDGE, FASTEST, SLOWEST
 from detent.control.head_computer import (
     FAULT,
@@ -51,6 +52,7 @@ from detent.kernel.registers import Registers, block, f8, i2, i4, i4_array, i8, 
 from detent.kernel.step import hot_step, step
 from detent.methods.method import Live
 from detent.methods.print_head.controller import PrintHeadController, PrintHeadLines
+from detent.methods.print_head.faults import places
 from detent.methods.print_head.line_plan import RESERVE
 from detent.methods.print_head.printed_page import PrintJob
 from detent.methods.print_head.run import NOT_FIRED, Printing, PrintRun, inked, line_commands, print_head_machine
@@ -471,5 +473,9 @@ def live(spec: PrintHeadSpec, operation: Callable[..., OperationParams]) -> dict
     def work(job: PrintJob) -> HeadWork:
         return HeadWork(spec, made[0], job)
 
-    made.append(Live(machine.params, machine.state, q, memory, machine.tick, fault=fault, tray=tray, work=work))
+    made.append(Live(
+            machine.params, machine.state, q, memory, machine.tick, fault=fault, tray=tray, work=work,
+            places=places(), fault_numbers={OBSTRUCTED: SATURATED},
+        )
+    )  # fmt: skip
     return {"": made[0]}

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from detent.control.guard import NO_ARRIVAL, enable_guard
+from detent.control.guard import FOLLOWING, JUMPED, NO_ARRIVAL, OVERSPEED, SATURATED, STUCK, enable_guard
 from detent.control.operation import (
     GO,
     HALT,
@@ -17,13 +17,16 @@ from detent.control.operation import (
     Operation,
     OperationParams,
 )  # fmt: skip
+from detent.control.reaction import SOFT
 from detent.control.table_positioner import HOLD as STANDS
 from detent.control.table_positioner import MOVE, SHORTEST, STOPPING, braking_path, set_out
 from detent.kernel.loop import serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
 from detent.methods.method import Live
+from detent.methods.rotary_table.build import GUARD_PERIOD
 from detent.methods.rotary_table.controller import TableController, TableControllerParams, TableLines
+from detent.methods.rotary_table.faults import places
 from detent.methods.rotary_table.host import TableHost
 from detent.methods.rotary_table.schema import RotaryTableSpec
 
@@ -106,7 +109,10 @@ def serve(  # noqa: PLR0913 - as all of its kind
     a.rests = 1 if r.state == STANDS and r.start == 0 and r.plus == r.minus else 0
     a.near = 1 if abs(r.oar - r.angle.aar) <= p.positioner.window else 0
     a.ready = 1 if r.interrupts > 0 else 0
-    a.fault = c.guard.code if c.guard.code != NO_ARRIVAL and lines.enable == 0 else 0
+    a.fault = a.soft = 0
+    if d.do != REST_OFF:
+        a.soft = c.guard.code if lines.enable and c.guard.code != NO_ARRIVAL else 0
+        a.fault = c.guard.hard if lines.enable == 0 else 0
 
 
 def live(spec: RotaryTableSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:
@@ -118,8 +124,12 @@ def live(spec: RotaryTableSpec, operation: Callable[..., OperationParams]) -> di
     q.operation = operation(strobe, spec.method.in_position_time, (0.0, 0.0), JOG, GO, MOVE_TO)
     q.operation.endless = 1
     machine: Any = host.machine
+    machine.params.controller.guard.softly = SOFT
+    table, speed = spec.protection, spec.limits.speed
+    limits = {STUCK: table.stuck_effort, SATURATED: 1.0, FOLLOWING: table.following_error,
+              OVERSPEED: table.overspeed * speed, JUMPED: table.jump * speed * GUARD_PERIOD}  # fmt: skip
     made = Live(
         machine.params, machine.state, q, TableLive(), machine.tick, "rad", fault=lambda: host.failure,
-        numbers=frozenset(map(int, spec.position)),
+        numbers=frozenset(map(int, spec.position)), places=places(spec, strobe), limits=limits,
     )  # fmt: skip
     return {"": made}

@@ -8,6 +8,8 @@ look, between two steps, and so no step finds half of an edit and a session repe
 import math
 from collections.abc import Callable
 
+from detent.control.guard import FOLLOWING
+from detent.control.guard import TRAVEL as END_OF_TRAVEL
 from detent.control.operation import (
     HALT,
     HOLD,
@@ -25,7 +27,7 @@ from detent.control.operation import (
     lower_end,
     upper_end,
 )  # fmt: skip
-from detent.control.step_rule import AT_REST, FAULT, REST, deflect, release
+from detent.control.step_rule import AT_REST, FAULT, INFEASIBLE, OUT_OF_RANGE, REST, deflect, release
 from detent.control.step_table import StepTableParams, move_stop
 from detent.errors import STEP_FAULT_TEXT, DetentError
 from detent.kernel.loop import serves
@@ -39,6 +41,7 @@ from detent.methods.stepper_envelope.controller import (
     StepperControllerParams,
     StepperLines,
 )
+from detent.methods.stepper_envelope.faults import places
 from detent.methods.stepper_envelope.host import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.planning.step_envelope import INDEX_BITS, StepEnvelope
@@ -244,7 +247,10 @@ def live_motor(spec: StepperEnvelopeSpec, name: str, operation: Callable[..., Op
     def fault() -> str:
         return f"motor {name}: {STEP_FAULT_TEXT[rule.cause]}" if rule.state == FAULT else ""
 
-    return Live(motor.p, motor.r, q, memory, tick, feed=motor.feed, fault=fault)
+    numbers = {FAULTS + INFEASIBLE: FOLLOWING, FAULTS + OUT_OF_RANGE: END_OF_TRAVEL}
+    return Live(
+        motor.p, motor.r, q, memory, tick, feed=motor.feed, fault=fault, places=places(tick), fault_numbers=numbers
+    )
 
 
 def live(spec: StepperEnvelopeSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:

@@ -7,7 +7,7 @@ import pytest
 from tests.cascade_rig import SAMPLE_TICKS, Rig, make_params
 
 import detent
-from detent.control.guard import FOLLOWING, NO_ARRIVAL, REVERSED, SATURATED, TRAVEL, await_arrival
+from detent.control.guard import FOLLOWING, NO_ARRIVAL, NO_NUMBER, REVERSED, SATURATED, TRAVEL, await_arrival
 from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.controller import (
     ARRIVED,
@@ -34,11 +34,15 @@ def guarded(**times):
     return p, c
 
 
-def test_what_is_no_number_is_a_following_error():
+def test_what_is_no_number_switches_off():
     p, c = guarded()
     look_after(p, c, 0)
     assert (c.event, c.on) == (0, 1)
     c.law.position_error = math.nan
+    look_after(p, c, 0)
+    assert (c.event, c.on, c.guard.code) == (FAULT, 0, NO_NUMBER)
+    p, c = guarded()
+    c.law.position_error = 2e-2
     look_after(p, c, 0)
     assert (c.event, c.on, c.guard.code) == (FAULT, 0, FOLLOWING)
 
