@@ -293,7 +293,8 @@ class Host:
     def ending(self, command: int) -> Ending | None:
         """How a command has ended; None while it has not."""
         self.note()
-        if command not in self._ended and 0 < command <= self._forgotten:
+        is_open = command in (self.board.operation.running, self.board.request.id)
+        if command not in self._ended and 0 < command <= self._forgotten and not is_open:
             raise DetentError(f"command {command}: it ended long ago; of the last {KEPT} it is known how")
         return self._ended.get(command)
 
