@@ -333,8 +333,9 @@ def test_51_what_cannot_work_is_refused(place: PanelPlace, told: str) -> None:
 def test_51_with_a_certificate_all_goes_encrypted(tmp_path: Any) -> None:
     certificate, key = str(tmp_path / "axis.pem"), str(tmp_path / "axis.key")
     subprocess.run(
-        [str(OPENSSL), "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2",
-         "-subj", "/CN=axis", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out", certificate],
+        [str(OPENSSL), "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+         "-days", "2", "-subj", "/CN=axis", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key,
+         "-out", certificate],
         check=True, capture_output=True,
     )  # fmt: skip
     trusted = ssl.create_default_context(cafile=certificate)
