@@ -1,8 +1,11 @@
 """Live specification, section 8: the panel's security (49 to 53) and who sees what."""
 
 import json
+import shutil
+import ssl
 import stat
 import struct
+import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -32,6 +35,9 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PanelRig]:
     """A panel whose axis stands still, but takes what is asked."""
     with PanelRig(tmp_path_factory.mktemp("panel")) as made:
         yield made
+
+
+OPENSSL = shutil.which("openssl")
 
 
 def routes_of(rig: PanelRig) -> list[tuple[str, str]]:
@@ -320,6 +326,28 @@ def test_51_a_network_is_refused_without_tls(bind: str, tmp_path: Any) -> None:
 def test_51_what_cannot_work_is_refused(place: PanelPlace, told: str) -> None:
     with pytest.raises(DetentError, match=told):
         place.check()
+
+
+@pytest.mark.process
+@pytest.mark.skipif(OPENSSL is None, reason="makes the certificate")
+def test_51_with_a_certificate_all_goes_encrypted(tmp_path: Any) -> None:
+    certificate, key = str(tmp_path / "axis.pem"), str(tmp_path / "axis.key")
+    subprocess.run(
+        [str(OPENSSL), "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+         "-days", "2", "-subj", "/CN=axis", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key,
+         "-out", certificate],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    trusted = ssl.create_default_context(cafile=certificate)
+    with PanelRig(tmp_path, certificate=certificate, key_file=key) as rig:
+        base = f"https://127.0.0.1:{rig.port}"
+        link = {"ticket": sign(rig.keys["operator"], "operator", LINK, time.time())}
+        with httpx.Client(base_url=base, verify=trusted) as client:
+            assert "Secure" in client.get("/enter", params=link).headers["set-cookie"]
+            assert client.post("/stop", headers={"origin": base}).status_code == 200
+            assert client.post("/stop", headers={"origin": rig.base}).status_code == 403
+        with pytest.raises(httpx.TransportError):
+            httpx.get(rig.base)
 
 
 def test_51_the_banner_of_plain_http_stays(rig: PanelRig, monkeypatch: pytest.MonkeyPatch) -> None:

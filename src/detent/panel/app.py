@@ -20,8 +20,8 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from detent.errors import DetentError
-from detent.panel.gate import Gate, Here, Rule
-from detent.panel.keys import COOKIE, LIFETIMES, LINK, TICKET, Keys, Pass
+from detent.panel.gate import Gate, Here, Rule, person, place_of
+from detent.panel.keys import COOKIE, LIFETIMES, LINK, TICKET, Keys
 from detent.panel.line import Line
 from detent.panel.sockets import Budget, Sockets
 
@@ -76,7 +76,7 @@ class Panel:
 
     @asynccontextmanager
     async def _attached(self, _app: Starlette) -> AsyncGenerator[None]:
-        self.line = await Line.open(self.channel, "panel")
+        self.line = self.sockets.line = await Line.open(self.channel, "panel")
         self.about = await self._ask(do="describe")
         self.sockets.looks |= set(self.about["questions"])
         yield
@@ -107,11 +107,11 @@ class Panel:
         who = self.keys.read(request.query_params.get("ticket", ""), LINK)
         if who is None:
             if self._wrong_links.take():
-                await self._tell(do="note", who=_place(request), what="shows a link that was used or has run out")
+                await self._tell(do="note", who=place_of(request), what="shows a link that was used or has run out")
             return PlainTextResponse(
                 "This link was used or has run out.\nGet one with: detent connect FILE link\n", 401
             )
-        await self._tell(do="note", who=f"{who.role} {_place(request)}", what="enters")
+        await self._tell(do="note", who=f"{who.role} {place_of(request)}", what="enters")
         answer = RedirectResponse("/", 303)
         answer.set_cookie(
             self.here.cookie, self.keys.sign(who.role, COOKIE), max_age=int(LIFETIMES[COOKIE]), httponly=True,
@@ -162,16 +162,6 @@ def _table(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> Response:
     writer.writerow(names)
     writer.writerows([f"'{c}" if isinstance(c, str) and c[:1] in "=+-@\t" else c for c in row] for row in rows)
     return Response(text.getvalue(), media_type="text/csv")
-
-
-def person(request: Request) -> str:
-    """Who asks, for the log: role, the beginning of its random name, and from where."""
-    who: Pass = request.scope["pass"]
-    return f"{who.role} {who.name[:6]} {_place(request)}"
-
-
-def _place(request: Request) -> str:
-    return f"from {request.client.host if request.client else '?'}"
 
 
 async def _told(_request: Request, error: Exception) -> Response:

@@ -6,6 +6,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any, NamedTuple
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import HTTPConnection
 from starlette.responses import HTMLResponse, PlainTextResponse
 from starlette.routing import BaseRoute, Match
 
@@ -170,6 +171,17 @@ def _refuse(scope: Scope, refused: Refusal) -> Any:
 async def _close(_scope: Scope, receive: Receive, send: Send) -> None:
     await receive()
     await send({"type": "websocket.close", "code": 1008})
+
+
+def place_of(connection: HTTPConnection) -> str:
+    """From where it comes."""
+    return f"from {connection.client.host if connection.client else '?'}"
+
+
+def person(connection: HTTPConnection) -> str:
+    """Who asks, for the log: role, the beginning of a random name, and from where."""
+    who: Pass = connection.scope["pass"]
+    return f"{who.role} {who.name[:6]} {place_of(connection)}"
 
 
 def local_names(addresses: Iterable[str], port: int, more: Iterable[str] = ()) -> frozenset[tuple[str, int]]:

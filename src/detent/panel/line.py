@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from typing import Any, cast
@@ -12,12 +13,16 @@ LONGEST = 4 << 20  # bytes of an answer: the axis file may have one million
 PATIENCE = 5.0  # how long an answer is waited for [s]
 
 
+Tell = Callable[[dict[str, Any]], object]
+
+
 class Line:
-    """Asks and hears; what was not asked for goes to whoever reads `heard`."""
+    """Asks and hears."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader, self._writer, self._marks = reader, writer, count()
         self._asked: dict[str, asyncio.Future[dict[str, Any]]] = {}
+        self._tell: dict[str | int, Tell] = {}  # who wants to hear of an ending: by mark, then by the command's id
         self.gone = asyncio.Event()
         self._hearing = asyncio.ensure_future(self._hear())
 
@@ -29,9 +34,11 @@ class Line:
         await line.ask({"do": "name", "who": who})
         return line
 
-    async def ask(self, message: dict[str, Any]) -> dict[str, Any]:
-        """Ask, and wait for the answer."""
+    async def ask(self, message: dict[str, Any], tell: Tell | None = None) -> dict[str, Any]:
+        """Ask, and wait for the answer; `tell` is called with the ending of a command."""
         mark = f"line {next(self._marks)}"
+        if tell is not None:
+            self._tell[mark] = tell
         self._asked[mark] = answer = asyncio.get_running_loop().create_future()
         try:
             self._writer.write(json.dumps(message | {"as": mark}).encode() + b"\n")
@@ -40,6 +47,7 @@ class Line:
             raise AxisError("the live axis does not answer; look at the process that runs it") from error
         finally:
             del self._asked[mark]
+            self._tell.pop(mark, None)
         if "error" in told:
             raise DetentError(told["error"])
         return told
@@ -48,7 +56,12 @@ class Line:
         try:
             while text := await self._reader.readline():
                 message = cast("dict[str, Any]", json.loads(text))
-                waiting = self._asked.get(message.get("as", ""))
+                mark = message.get("as", "")
+                if "id" in message and mark in self._tell:
+                    self._tell[message["id"]] = self._tell.pop(mark)
+                if "ended" in message and (tell := self._tell.pop(message["ended"]["id"], None)):
+                    tell(message)
+                waiting = self._asked.get(mark)
                 if waiting is not None and not waiting.done():
                     waiting.set_result(message)
         except (OSError, ValueError):

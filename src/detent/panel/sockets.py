@@ -17,11 +17,14 @@ from typing import Any, cast
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from detent.errors import DetentError
+from detent.panel.gate import person
 from detent.panel.keys import TICKET, Keys, Pass
-from detent.panel.line import LONGEST
+from detent.panel.line import LONGEST, Line
 
 MOST_SOCKETS = 16
 LONGEST_FRAME = 1 << 16  # bytes, as in the channel
+MOST_WAITING = 1 << 16  # bytes that a page has asked, and the axis has not read
 FIRST_WORD = 2.0  # until the ticket must be there [s]
 A_SECOND = 50.0  # messages of a client
 FLOOD = 500.0  # refused ones in a second, until it is put out
@@ -55,6 +58,7 @@ class Sockets:
     def __init__(self, channel: Path, keys: Keys) -> None:
         self._channel, self._keys = channel, keys
         self._open = 0
+        self.line: Line | None = None  # of the panel itself
         self.looks = {"watch"}  # what changes nothing; the axis names the rest
 
     async def attend(self, socket: WebSocket) -> None:
@@ -87,8 +91,7 @@ class Sockets:
         except OSError:
             await socket.close(1011, "the live axis has gone")
             return
-        place = socket.client.host if socket.client else "?"
-        for first in ({"do": "name", "who": f"{who.role} {who.name[:6]} from {place}"}, {"do": "watch", "rate": RATE}):
+        for first in ({"do": "name", "who": person(socket)}, {"do": "watch", "rate": RATE}):
             writer.write(json.dumps(first).encode() + b"\n")
         tasks = {
             asyncio.ensure_future(self._to_axis(socket, writer, who)),
@@ -112,6 +115,8 @@ class Sockets:
                 return
             message, wrong = self._message(told)
             word = message.get("do", "")
+            if not wrong and word not in FREE and writer.transport.get_write_buffer_size() > MOST_WAITING:
+                wrong = "the axis is busy with what was asked before (a stop is always taken)"
             if not wrong and not who.may(needed := self.role_for(word)):
                 wrong = f"a {who.role} may not {word}; it needs {needed}"
             if word not in FREE and not commands.take():
@@ -123,8 +128,21 @@ class Sockets:
                 mark = {"as": message["as"]} if "as" in message else {}
                 await socket.send_text(json.dumps(mark | {"error": wrong}))
                 continue
-            writer.write(json.dumps(message).encode() + b"\n")
-            await writer.drain()
+            if word in FREE:
+                await self._stop(socket, message)
+            else:
+                writer.write(json.dumps(message).encode() + b"\n")
+
+    async def _stop(self, socket: WebSocket, message: dict[str, Any]) -> None:
+        """Ask on the panel's own line: what this page has asked before may keep the axis waiting, for a disk say."""
+        assert self.line is not None  # noqa: S101 - the server takes no socket before
+        mark = {"as": message["as"]} if "as" in message else {}
+        said = {"do": message["do"], "who": person(socket)}
+        try:
+            told = await self.line.ask(said, lambda ended: asyncio.ensure_future(_tell(socket, ended)))
+        except DetentError as error:
+            told = {"error": str(error)}
+        await _tell(socket, told | mark)
 
     def _message(self, told: Any) -> tuple[dict[str, Any], str]:
         """What a page says, as far as it is passed on; and what is wrong with it."""
@@ -142,6 +160,11 @@ class Sockets:
         if word in FREE or word in self.looks:
             return "viewer"
         return "engineer" if word in ENGINEERS else "operator"
+
+
+async def _tell(socket: WebSocket, message: dict[str, Any]) -> None:
+    with suppress(RuntimeError, WebSocketDisconnect):  # it has closed
+        await socket.send_text(json.dumps(message))
 
 
 def _read(told: Any) -> dict[str, Any]:

@@ -302,6 +302,19 @@ def test_how_a_command_of_long_ago_ended_is_not_known(folder: Path, monkeypatch:
             session.ending(asked[0])
 
 
+def test_a_command_that_still_runs_has_not_ended_long_ago(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("detent.operate.host.KEPT", 20)
+    with detent.live(folder / "slide.toml", wall=False) as axis:
+        axis.enable()
+        session: Any = axis.link
+        jog = session.ask("jog", "1 mm/s")
+        for _ in range(60):
+            session.ask("keep")
+            session.host.run(1)
+        assert session.ending(jog) is None
+        assert session.host._forgotten > jog
+
+
 def test_a_stop_for_which_the_mailbox_has_no_room_is_done(folder: Path) -> None:
     with detent.live(folder / "slide.toml", wall=False) as axis:
         session: Any = axis.link
