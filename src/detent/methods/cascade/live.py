@@ -127,4 +127,7 @@ def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[s
     def fault() -> str:
         return describe_cause(host) if host.controller.guard.code else ""
 
-    return {"": Live(host.params, host.state, q, memory, host.tick, spec.unit("m"), host.feed, fault)}
+    return {"": Live(
+        host.params, host.state, q, memory, host.tick, spec.unit("m"), spec.limits.speed, {"title": "Cascade loop"},
+        host.feed, fault,
+    )}  # fmt: skip

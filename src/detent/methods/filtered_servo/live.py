@@ -125,4 +125,7 @@ def live(spec: FilteredServoSpec, operation: Callable[..., OperationParams]) -> 
     q.rate = spec.limits.speed / spec.pulse * PER_PULSE
     q.operation = operation(LOOK, spec.method.in_position_time, (0.0, spec.limits.travel), MOVE_TO, MOVE_BY, JOG)
     machine: Any = host.machine
-    return {"": Live(machine.params, machine.state, q, FilteredLive(), machine.tick, fault=lambda: host.failure)}
+    return {"": Live(
+        machine.params, machine.state, q, FilteredLive(), machine.tick, speed=spec.limits.speed,
+        view={"title": "Filtered speed"}, fault=lambda: host.failure,
+    )}  # fmt: skip

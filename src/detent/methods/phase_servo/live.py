@@ -120,4 +120,8 @@ def live(spec: PhaseServoSpec, operation: Callable[..., OperationParams]) -> dic
     begin = round((spec.mechanics.start_position - host.home) / spec.step)
     machine: Any = host.machine
     memory = PhaseLive(base=begin, position=begin)
-    return {"": Live(machine.params, machine.state, q, memory, machine.tick, fault=lambda: host.failure)}
+    cycle = machine.params.controller.converters.absolute.mask + 1
+    return {"": Live(
+        machine.params, machine.state, q, memory, machine.tick, speed=spec.limits.speed,
+        view={"title": "Phase", "data": {"cycle": int(cycle)}}, fault=lambda: host.failure,
+    )}  # fmt: skip

@@ -118,8 +118,7 @@ def live(spec: RotaryTableSpec, operation: Callable[..., OperationParams]) -> di
     q.operation = operation(strobe, spec.method.in_position_time, (0.0, 0.0), JOG, GO, MOVE_TO)
     q.operation.endless = 1
     machine: Any = host.machine
-    made = Live(
-        machine.params, machine.state, q, TableLive(), machine.tick, "rad", fault=lambda: host.failure,
-        numbers=frozenset(map(int, spec.position)),
-    )  # fmt: skip
-    return {"": made}
+    return {"": Live(
+        machine.params, machine.state, q, TableLive(), machine.tick, "rad", spec.limits.speed, {"title": "Dial"},
+        fault=lambda: host.failure, numbers=frozenset(map(int, spec.position)),
+    )}  # fmt: skip
