@@ -250,8 +250,15 @@ def live_motor(spec: StepperEnvelopeSpec, name: str, operation: Callable[..., Op
         "speeds": [zones.limits[number] * table.step for number in zones.numbers],
     }
     return Live(
-        motor.p, motor.r, q, memory, tick, speed=table.limits.speed, view={"title": "Envelope", "data": data},
-        feed=motor.feed, fault=fault,
+        motor.p,
+        motor.r,
+        q,
+        memory,
+        tick,
+        speed=table.limits.speed,
+        view={"title": "Envelope", "data": data},
+        feed=motor.feed,
+        fault=fault,
     )
 
 
