@@ -6,7 +6,7 @@ look, between two steps, and so no step finds half of an edit and a session repe
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from detent.control.operation import (
     HALT,
@@ -245,9 +245,10 @@ def live_motor(spec: StepperEnvelopeSpec, name: str, operation: Callable[..., Op
         return f"motor {name}: {STEP_FAULT_TEXT[rule.cause]}" if rule.state == FAULT else ""
 
     zones = tables.up.zones
-    data = {
-        "edges": [table.mechanics.lower_end + int(edge) * table.step for edge in zones.edges],
-        "speeds": [zones.limits[number] * table.step for number in zones.numbers],
+    limits: Sequence[float] = zones.limits
+    data: dict[str, list[float]] = {
+        "edges": [table.mechanics.lower_end + edge * table.step for edge in zones.edges.tolist()],
+        "speeds": [limits[number] * table.step for number in zones.numbers.tolist()],
     }
     return Live(
         motor.p,
