@@ -30,6 +30,7 @@ from tests.course_rig import excursions, follow, shortest_stop, turns
 from tests.difference import diff
 from tests.live_axes import PAGES, PLAIN, Head, Stepper, longest_stop, moves
 from tests.live_bench import MOVED, OPERATED, Bench
+from tests.live_browser import Script, panelled, run_script, until
 from tests.live_course import COMPILED, COVERED, bound, hunted, under_way
 from tests.live_home import WAYS, Lost, zeros
 from tests.places import ROOT
@@ -58,6 +59,7 @@ from detent.methods.stepper_envelope.stage_job import Change, StageMove
 from detent.operate.faults import injection_of
 from detent.operate.host import Ending, Host, repeat
 from detent.operate.session import Session
+from detent.operate.words import why_not_moving
 from detent.planning import course
 from detent.planning.course import advance as advance_course
 from detent.plant.injection import BLOCKED
@@ -1794,3 +1796,212 @@ def test_22_a_table_homes_by_what_its_resolvers_show(tmp_path):
         assert (axis.status["trust"], axis.position) == ("referenced", at)
         axis.confirm()
         axis.go_to(3)
+
+
+# ---- the panel, in a real browser
+
+LEASE = 0.2  # of a jog [s]
+WAYS = (
+    "mouse up", "touch end", "key up", "blur", "hidden tab", "page closed", "context menu", "network cut",
+    "a second of lag", "server killed",
+)  # fmt: skip
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_40_page_is_quick_and_leaves_the_loop_alone(tmp_path: Path) -> None:
+    """First values within 2 s, 20 screens a second with eight channels of 1 kHz; the loop misses no more by it."""
+    with panelled(tmp_path) as live, live.connect() as axis:
+        before = axis.status["loop"]
+        time.sleep(5.0)
+        alone = axis.status["loop"]
+        found = run_script("speed", live.link(), "5")
+    missed = (alone["skipped"] - before["skipped"]) / (alone["periods"] - before["periods"])
+    assert found["first"] < 2.0
+    assert 20.0 <= found["screens"] <= 30.0
+    assert found["channels"] == 8
+    assert found["rows"] == pytest.approx(1000.0, rel=0.05)
+    assert found["skipped"] / found["periods"] <= 1.5 * missed + 0.005
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_41_a_jog_ends_however_it_is_let_go(tmp_path: Path) -> None:
+    """At rest within lease and ramp in ten ways of ten, and it does not begin again; the page says over which way."""
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live, live.connect() as axis, Script("jog") as page:
+        for way in WAYS:
+            page.tell("hold", way, "plus" if axis.position < 0.25 else "minus", live.link())
+            let_go = axis.status
+            if way == "server killed":
+                live.kill_panel()
+            page.tell("release")
+            rests = until(axis, lambda s: s["rests"] and s["running"] is None)
+            speed, ramp = 0.1, rests["last_stop"]
+            assert 0.0 < ramp < 0.01, way
+            assert abs(rests["position"] - let_go["position"]) < speed * (LEASE + 0.5) + ramp, way
+            time.sleep(0.5)
+            assert axis.status["position"] == pytest.approx(rests["position"], abs=1e-4), way
+            told = page.tell("look")
+            is_told = way not in {"page closed", "network cut", "server killed"}  # it hears of no stop, or is gone
+            assert told["told"].startswith("Stopped over") or not is_told, way
+            assert not told["pressed"], way
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Every view as a browser has found it on a screen of 360 px."""
+    with panelled(tmp_path_factory.mktemp("views"), "cascade.toml", "--period", "10 ms") as live:
+        found = run_script("views", live.link())
+    assert len(found["views"]) >= 11
+    return found
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_42_stop_is_on_every_screen(tmp_path: Path, views: dict[str, Any]) -> None:
+    """By a form where there are no scripts, by Esc on each view, on 360 px without scrolling."""
+    for name, seen in views["views"].items():
+        stop = seen["stop"]
+        assert 0 <= stop["top"] < stop["bottom"] <= stop["screen"], name
+        assert (seen["escape"], stop["isOnTop"], stop["height"] >= 64) == (True, True, True), name
+        assert stop["wide"] <= 360, f"{name} scrolls sideways"
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live, live.connect() as axis:
+        epoch = axis.status["epoch"]
+        plain = run_script("noscript", live.link("viewer"))
+        assert axis.status["epoch"] > epoch
+    assert plain["band"].startswith("SIMULATION")
+    assert (plain["at"], plain["stop"]["bottom"] <= 640) == ("/", True)
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_43_every_view_is_sound(views: dict[str, Any]) -> None:
+    """No error, no request to another host, nothing serious for axe-core; the keyboard reaches all that can be used."""
+    assert (views["problems"], views["strangers"]) == ([], [])
+    for name, seen in views["views"].items():
+        assert (name, seen["serious"], seen["unreached"]) == (name, [], [])
+    fault = views["fault"]
+    assert (fault["offered"], fault["asked"]) == (["encoder stuck", "encoder off"], ["inject", "encoder stuck 1 mm"])
+    for told in ("stands still", "position was lost", "1.200 mm", "1.000 mm", "cable", "home", "F02"):
+        assert told in fault["text"], told
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_44_an_hour_of_telemetry_leaves_the_heap_as_it_is(tmp_path: Path) -> None:
+    """An hour of status and of rows at 1 kHz, handed to the scope as fast as it takes them."""
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live:
+        found = run_script("heap", live.link())
+    assert found["problems"] == []
+    assert found["rows"] > 3_600_000
+    assert found["seconds"] < 3600 / 20
+    assert found["after"] < 1.1 * found["before"]
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_45_two_browsers_see_who_commands_and_either_stops(tmp_path: Path) -> None:
+    """The second is refused, a viewer stops, and taking over ends the jog of the first."""
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live:
+        found = run_script("two", live.link(), live.link(), live.link("viewer"))
+    assert found["problems"] == []
+    assert found["mine"].startswith("you command")
+    assert "engineer" in found["theirs"]
+    assert not found["theirs"].startswith("you")
+    assert (found["refused"]["how"], found["refused"]["code"]) == ("refused", ops.SECOND)
+    assert "operator" in found["viewerMoves"]
+    assert found["stoppedByViewer"] is None
+    assert found["afterTaking"]["theirs"].startswith("you command")
+    assert not found["afterTaking"]["mine"].startswith("you")
+    assert found["afterTaking"]["pressed"] == 0
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_47_scope_shows_the_edge_at_its_trigger(tmp_path: Path) -> None:
+    """Half of the record lies before the edge, which is there within a sample; the file holds what the ring does."""
+    with panelled(tmp_path, "cascade.toml", "--period", "5 ms") as live:
+        found = run_script("scope", live.link())
+    assert found["problems"] == []
+    rows, ring = np.array(found["rows"]), np.array(found["ring"])
+    velocity, level = rows[:, 2 + found["channels"].index("velocity")], 5e-3
+    trigger = int(np.flatnonzero(rows[:, 1] == 0.0)[0])
+    assert trigger == len(rows) // 2
+    assert velocity[trigger - 1] < level <= velocity[trigger]
+    assert (velocity[:trigger] < level).all()
+    np.testing.assert_array_equal(rows[:, 0], ring[:, 0])
+    np.testing.assert_array_equal(rows[:, 2:].astype(np.float32), ring[:, 1:].astype(np.float32))
+    assert "1/Δt" in found["cursors"]
+
+
+@pytest.mark.compiled
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time")
+def test_48_why_not_moving_names_what_is_not_met() -> None:
+    """Fifteen situations, each made at the axis: its reason and its remedy, and those alone."""
+    host = Bench("cascade").host
+    session, o = Session(host, {}), host.board.operation
+
+    def why(client: int = 1) -> list[tuple[str, str]]:
+        return why_not_moving(session.status(), client)
+
+    def ask(word: str, value: object = None) -> None:
+        session.wait(session.ask(word, value))
+
+    def is_told(what: str, remedy: str, *others: str, client: int = 1) -> None:
+        told = why(client)
+        assert any(what in one and remedy in do for one, do in told), told
+        assert len(told) == 1 + len(others), told
+        assert all(any(other in one for one, _ in told) for other in others), told
+
+    is_told("not ready", "wait")
+    host.run_until_ready()
+    is_told("no torque: switch on disabled", "enable")
+    ask("order", 0)
+    is_told("no torque: ready to switch on", "enable")
+    ask("order", 1)
+    is_told("no torque: switched on", "enable")
+    ask("enable")
+    is_told("tenth of the speed", "confirm")
+    ask("confirm")
+    is_told("nothing has been asked", "jog")
+    ask("move_to", "0 mm")
+    is_told("lower limit", "other side")
+    is_told("somebody else commands", "take", "lower limit", client=2)
+    ask("move_to", "500 mm")
+    is_told("upper limit", "other side")
+    ask("move_to", "250 mm")
+    o.answer.near = 0
+    is_told("not in its window", "wait")
+    o.answer.near, o.answer.limited = 1, 1
+    is_told("at its limit", "holds")
+    o.answer.limited = 0
+    o.trust = ops.NOT_KNOWN
+    is_told("not known", session.find_position())
+    o.trust = ops.REFERENCED
+    ask("order", 5)
+    is_told("quick stop", "enable")
+    ask("enable")
+    o.state, o.fault = STATE_NAMES.index("fault reaction active"), FOLLOWING
+    is_told(f"fault {FOLLOWING}", "come to rest")
+    o.state = STATE_NAMES.index("fault")
+    is_told(f"fault {FOLLOWING}", "reset")
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_46_positions_are_taught_typed_and_taken_back(tmp_path: Path) -> None:
+    """Teach two, go to the first, type one in mm and in inches, undo, save; what is no place changes nothing."""
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live:
+        found = run_script("positions", live.link())
+    assert found["problems"] == []
+    assert found["taught"] == "teach: done"
+    assert found["right"] == pytest.approx(found["begin"] * 1e3 + 30.0, abs=0.1)
+    assert found["edited"] == ["edit: done", pytest.approx(35.0, abs=1e-3)]
+    assert found["inches"] == ["edit: done", pytest.approx(50.8, abs=1e-3)]
+    assert "parsec" in found["wrong"][0]
+    assert found["undone"] == pytest.approx(35.0, abs=1e-3)
+    names = [line.split(",") for line in found["file"].splitlines()]
+    assert {"left", "right"} < {cell for line in names for cell in line}
+    assert found["job"] == "Job done: 4 moves, every one inside its window."
+    assert found["jobAt"] == pytest.approx(0.035, abs=1e-4)
+    assert "move 2 (9 m), refused" in found["badJob"]

@@ -52,7 +52,8 @@ class Session:
         channels = [{"name": name, "unit": unit, "help": help_} for name, (_, unit, help_) in self._signals.items()]
         return self.about | {
             "unit": self.unit, "period": period, "commands": words, "limits": limits, "channels": channels,
-            "injections": can_inject,
+            "injections": can_inject, "method": self.host.method, "max_speed": self.host.axis.speed,
+            "view": dict(self.host.axis.view),
         }  # fmt: skip
 
     def status(self) -> dict[str, Any]:

@@ -474,8 +474,7 @@ def live(spec: PrintHeadSpec, operation: Callable[..., OperationParams]) -> dict
         return HeadWork(spec, made[0], job)
 
     made.append(Live(
-            machine.params, machine.state, q, memory, machine.tick, fault=fault, tray=tray, work=work,
-            places=places(), fault_numbers={OBSTRUCTED: SATURATED},
-        )
-    )  # fmt: skip
+        machine.params, machine.state, q, memory, machine.tick, speed=spec.limits.speed, view={"title": "Print line"},
+        fault=fault, tray=tray, work=work, places=places(), fault_numbers={OBSTRUCTED: SATURATED},
+    ))  # fmt: skip
     return {"": made[0]}
