@@ -26,7 +26,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 # The commands share one environment: under `make -j` two of them must not install into it at once.
 .NOTPARALLEL:
-.PHONY: help demo test test-wide test-long test-lowest tried lock locked bench bench-smoke coverage lint format types imports docs check clean venv-base venv-test venv-dev
+.PHONY: help demo test test-wide test-long test-lowest tried lock locked bench bench-smoke coverage lint format types imports docs figures check clean venv-base venv-test venv-dev
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1#/' | awk -F'#' '{ printf "%-20s %s\n", $$1, $$2 }'
@@ -120,6 +120,9 @@ docs: venv-dev ## build the documentation; a warning is an error
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 	@! grep -rlE '<(script|img|link)[^>]*(src|href)="(https?:)?//' docs/_build/html --include='*.html' || { echo "these pages load something from the network" >&2; exit 1; }
 	@echo "Documentation: $(CURDIR)/docs/_build/html/index.html"
+
+figures: venv-test ## draw the figures of the documentation anew, and replace those that look different
+	$(BIN)/python docs/draw.py
 
 check: lint types imports test docs bench-smoke ## all that a change must pass, but for the long tests
 

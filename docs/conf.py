@@ -1,7 +1,6 @@
 """How Sphinx builds the documentation: Markdown through MyST, the furo theme, API pages from the docstrings.
 
-The reference tables (generate.py) and the figures of the explanation (figures.py and figures_*.py) are made anew from
-the code.
+The reference tables are made anew from the code (generate.py); the figures are committed (draw.py).
 """
 
 import re
@@ -23,7 +22,8 @@ release = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 version = release
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
-exclude_patterns = ["_build", "explanation/trust-table.md", "explanation/endurance-table.md"]
+PARTS = ("trust", "endurance", "feedback", "step-methods")  # tables that a page includes
+exclude_patterns = ["_build", *(f"explanation/{part}-table.md" for part in PARTS)]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = False  # types of other packages are named in signatures, and their inventories need a network
 
@@ -68,20 +68,6 @@ def setup(app: Any) -> None:
     """Make the generated parts before any page is read."""
     app.connect("autodoc-process-docstring", keep_bars)
     app.add_html_math_renderer("mathml", (put_formula("inline"), None), (put_formula("block"), None))
-    import figures
-    import figures_cascade
-    import figures_course
-    import figures_house
-    import figures_rotary
-    import figures_servos
-    import figures_steppers
     import generate
 
     generate.write_all()
-    figures.draw_all()
-    figures_servos.draw_all()
-    figures_rotary.draw_all()
-    figures_steppers.draw_all()
-    figures_cascade.draw_all()
-    figures_course.draw_all()
-    figures_house.draw_all()

@@ -1,10 +1,9 @@
-"""The figures of the explanation: each is drawn from a run of the simulation when the documentation is built.
+"""The figures of the print head, each drawn from a run of the simulation, and the helpers of the other figures_*.py.
 
-Called by conf.py; they are drawn again when this file or the package has changed. The figures of the servos are in
-figures_servos.py, which uses the helpers of this file.
+draw.py calls the functions in FIGURES of each of these files.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-FOLDER = Path(__file__).resolve().parent / "_build" / "generated"
+FOLDER = Path(__file__).resolve().parent / "_build" / "figures"
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7d8996"
 DRIFTED = ("disturbance.motor_constant=+10 %", "disturbance.friction_right=+20 %", "disturbance.friction_left=+20 %")
 SIGNALS = (
@@ -35,7 +34,7 @@ def run(*overrides: str) -> Any:
 
 @contextmanager
 def picture(name: str, rows: int, height: float, *, columns: int = 1, share_x: bool = True) -> Generator[Any]:
-    """Axes of a figure that is saved as an SVG on leaving."""
+    """Axes of a figure that is saved on leaving."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -48,7 +47,7 @@ def picture(name: str, rows: int, height: float, *, columns: int = 1, share_x: b
             rows, columns, figsize=(8.5, height), sharex=share_x, layout="constrained", squeeze=False
         )
         yield axes[:, 0] if columns == 1 else axes[0]
-        figure.savefig(FOLDER / name, metadata={"Date": None})
+        figure.savefig(FOLDER / name)
         plt.close(figure)
 
 
@@ -72,7 +71,7 @@ def power_up() -> None:
     done = run()
     part = done.trace.between(0.0, done.result.time_ready)
     t, position, number = part.time, part["plant.train.position"] / 0.0254, part["controller.head.calibration_pass"]
-    with picture("power-up.svg", 2, 4.6) as (where, speed):
+    with picture("power-up.png", 2, 4.6) as (where, speed):
         where.plot(t, position, color=BLUE)
         where.set_ylabel("head position [in]")
         speed.plot(t, speed_of(part), color=BLUE)
@@ -99,7 +98,7 @@ def parts_of_the_drive() -> None:
     t, drive, speed = (part.time - line.start) * 1e3, part["controller.head.drive_cmd"] * sign, speed_of(part) * sign
     emf = found.slope * 6 * speed / 256
     friction = np.full_like(emf, found.friction)
-    with picture("parts.svg", 2, 5.4) as (whole, parts):
+    with picture("parts.png", 2, 5.4) as (whole, parts):
         whole.plot(t, drive, color="black", label="drive value put out")
         whole.set_ylabel("drive along the motion [count]")
         parts.plot(t, emf, color=BLUE, label="back-EMF part: K × speed / 256")
@@ -125,7 +124,7 @@ def two_points() -> None:
     def drive(slope: float, friction: float) -> Any:
         return slope * 6 * v / 256 + friction
 
-    with picture("two-points.svg", 1, 4.0, columns=2) as areas:
+    with picture("two-points.png", 1, 4.0, columns=2) as areas:
         for area, (side, line) in zip(areas, done.result.identified.items(), strict=True):
             default = drive(line.default_slope, line.default_friction)
             area.plot(v, default, ":", color=GREY, label="power-on default")
@@ -147,7 +146,7 @@ def two_points() -> None:
 
 def transition() -> None:
     """Motor current of a stop with and without transition mode."""
-    with picture("transition.svg", 3, 6.4) as (drive, current, speed):
+    with picture("transition.png", 3, 6.4) as (drive, current, speed):
         for text, colour, overrides in (
             ("with transition mode", BLUE, ()),
             ("without: the head coasts until the drive value is 0", ORANGE, ("method.transition=false",)),
@@ -173,7 +172,7 @@ def transition() -> None:
 
 def turn_around() -> None:
     """From one line straight into the next: drive value, current and speed through zero."""
-    with picture("turn-around.svg", 3, 6.4) as (drive, current, speed):
+    with picture("turn-around.png", 3, 6.4) as (drive, current, speed):
         for text, colour, overrides in (
             ("with the friction jump", BLUE, ()),
             ("without it", ORANGE, ("method.friction_jump=false",)),
@@ -201,40 +200,7 @@ def comparison() -> None:
 
     axis = detent.load(detent.example("print_head.toml"), DRIFTED)
     (drives,) = axis.compare()
-    draw_figures(drives.figures(), FOLDER / "comparison.svg")
+    draw_figures(drives.figures(), FOLDER / "comparison.png")
 
 
 FIGURES = (power_up, parts_of_the_drive, two_points, transition, turn_around, comparison)
-
-
-def stamp(source: Path) -> str:
-    """Changes with this file, with `source`, and with every source of the package, examples included."""
-    from hashlib import sha256
-
-    from detent.kernel.cache import PACKAGE
-
-    digest = sha256(Path(__file__).read_bytes() + source.read_bytes())
-    for part in sorted(path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".toml", ".txt", ".csv")):
-        digest.update(part.read_bytes())
-    return digest.hexdigest()
-
-
-def draw_stale(figures: Sequence[Callable[[], None]], source: Path) -> None:
-    """Draw the figures of the file `source`, unless those of its present stamp are there."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    kept, now = FOLDER / f"{source.stem}.stamp", stamp(source)
-    if kept.exists() and kept.read_text(encoding="utf-8") == now:
-        return
-    for draw in figures:
-        draw()
-    kept.write_text(now, encoding="utf-8")
-
-
-def draw_all() -> None:
-    """Draw every figure of this file."""
-    draw_stale(FIGURES, Path(__file__))
-    run.cache_clear()
-
-
-if __name__ == "__main__":
-    draw_all()

@@ -1,13 +1,9 @@
-"""The figures of the cascade axis: each is drawn from runs of the simulation when the documentation is built.
+"""The figures of the cascade axis: each is drawn from runs of the simulation."""
 
-Called by conf.py; they are drawn again when this file, figures.py or the package has changed.
-"""
-
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, draw_stale, picture
+from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, picture
 
 LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "fontsize": 9}
 
@@ -40,7 +36,7 @@ def feed_forward() -> None:
         ("velocity, acceleration", ("viscous", "coulomb")),
         ("all of it", ()),
     )
-    with picture("feedforward.svg", 2, 4.6) as (coarse, fine):
+    with picture("feedforward.png", 2, 4.6) as (coarse, fine):
         for (name, off), colour in zip(shares, (GREY, ORANGE, GREEN, BLUE), strict=True):
             run = one_move(slide(*(f"method.feed_forward.{key}=0" for key in off)), 0.27)
             part = run.trace.between(run.result.moves[0].begin, run.result.moves[0].end)
@@ -60,14 +56,14 @@ def profiles() -> None:
 
     # Its table stands in the text, as the terminal prints it.
     drawn = [figure for figure in slide().compare()[0].figures() if figure.charts]
-    draw_figures(drawn, FOLDER / "profiles.svg")
+    draw_figures(drawn, FOLDER / "profiles.png")
 
 
 def which_encoder() -> None:
     """Load and motor at the end of a move across backlash, with the position loop on either encoder."""
     import detent
 
-    with picture("which-encoder.svg", 2, 4.4) as areas:
+    with picture("which-encoder.png", 2, 4.4) as areas:
         for area, where in zip(areas, ("motor", "load"), strict=True):
             axis = detent.load(
                 detent.example("turntable.toml"),
@@ -92,8 +88,3 @@ def which_encoder() -> None:
 
 
 FIGURES = (feed_forward, profiles, which_encoder)
-
-
-def draw_all() -> None:
-    """Draw every figure of this file."""
-    draw_stale(FIGURES, Path(__file__))

@@ -1,10 +1,9 @@
 """The figure of the course of a live axis: one jog, let go at different moments."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import BLUE, GREEN, GREY, ORANGE, draw_stale, picture
+from figures import BLUE, GREEN, GREY, ORANGE, picture
 
 LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "fontsize": 9}
 PERIOD, HIGHEST = 1e-3, 0.2
@@ -30,7 +29,7 @@ def jog_until(release: float) -> Any:
 
 def let_go() -> None:
     """The three ends of a jog."""
-    with picture("course.svg", 3, 6.2) as (where, speed, acceleration):
+    with picture("course.png", 3, 6.2) as (where, speed, acceleration):
         for release, colour, text in RELEASES:
             t, x, v, a = jog_until(release).T
             begin = int(np.searchsorted(t, release))
@@ -50,8 +49,3 @@ def let_go() -> None:
 
 
 FIGURES = (let_go,)
-
-
-def draw_all() -> None:
-    """Draw the figure of this file."""
-    draw_stale(FIGURES, Path(__file__))

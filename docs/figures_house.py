@@ -1,5 +1,6 @@
 """The drawing of the house: its rooms as the import contract orders them, sized by their lines."""
 
+import math
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -37,14 +38,16 @@ def colour_of(room: str) -> str:
 
 
 def draw_floor(axes: Any, y: float, rooms: list[tuple[str, int]]) -> None:
-    """Rooms of a floor side by side, as wide as they have lines, but never too narrow for their name."""
-    widths = [max(lines**0.5, 17.0) for _, lines in rooms]
+    """Rooms of a floor side by side, the wider the more lines they have, but never too narrow for their name.
+
+    Lines count in powers of two: the drawing does not change with every line.
+    """
+    widths = [max(2 ** (round(math.log2(lines)) / 2), 17.0) for _, lines in rooms]
     scale = 100.0 / max(sum(widths), 100.0)
     x = (100.0 - scale * sum(widths)) / 2
-    for (room, lines), width in zip(rooms, widths, strict=True):
+    for (room, _), width in zip(rooms, widths, strict=True):
         axes.barh(y, scale * width - 0.6, left=x + 0.3, height=0.84, color=colour_of(room), alpha=0.85)
-        text = f"{room}\n{lines / 1000:.1f}k lines" if lines >= 1000 else f"{room}\n{lines} lines"
-        axes.text(x + scale * width / 2, y, text, ha="center", va="center", color="white", fontsize=7.5)
+        axes.text(x + scale * width / 2, y, room, ha="center", va="center", color="white", fontsize=7.5)
         x += scale * width
 
 
@@ -59,7 +62,7 @@ def house() -> None:
             floors.append([(room, lines_in(folder / room)) for entry in inside[1:] for room in entry])
         else:
             floors.append([(room, lines_in(PACKAGE / room)) for room in layer])
-    with figures.picture("house.svg", 1, 0.52 * len(floors) + 0.3) as (axes,):
+    with figures.picture("house.png", 1, 0.52 * len(floors) + 0.3) as (axes,):
         for number, rooms in enumerate(floors):
             draw_floor(axes, float(-number), rooms)
         axes.set_xlim(0, 100)
@@ -68,8 +71,3 @@ def house() -> None:
 
 
 FIGURES = (house,)
-
-
-def draw_all() -> None:
-    """Draw the house."""
-    figures.draw_stale(FIGURES, Path(__file__))

@@ -1,14 +1,10 @@
-"""The figures of the rotary table: each is drawn from runs of the simulation when the documentation is built.
-
-Called by conf.py; they are drawn again when this file, figures.py or the package has changed.
-"""
+"""The figures of the rotary table: each is drawn from runs of the simulation."""
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, draw_stale, label, picture
+from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, label, picture
 
 PINK = "#CC79A7"
 LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "fontsize": 9}
@@ -53,7 +49,7 @@ def composition() -> None:
     turn = 360 / spec.ratio
     places = np.arange(0, spec.period, 719)
     errors = np.arange(-2.5, 2.51, 0.1)
-    with picture("composition.svg", 1, 4.0, columns=2, share_x=False) as (words, wrong):
+    with picture("composition.png", 1, 4.0, columns=2, share_x=False) as (words, wrong):
         angles = np.arange(0, 3 * p.fine, 8)
         place, fine = angles * 360 / spec.period, angles % p.fine / p.fine
         coarse = (place + 1.0) * p.coarse // 360 * p.ratio / p.coarse
@@ -103,7 +99,7 @@ def walk() -> None:
     left = degrees(spec, part["controller.positioner.interpolator.irr"])
     c = m - part["controller.positioner.z"] * left
     jogging = m > 700
-    with picture("endless-jog.svg", 3, 7.6) as (angle, rest, lag):
+    with picture("endless-jog.png", 3, 7.6) as (angle, rest, lag):
         angle.plot(t, np.where(jogging, m, np.nan), color=GREEN, linestyle=":", linewidth=1.5, label="M target")
         angle.plot(t, np.where(jogging, np.nan, m), color=GREEN, linestyle=":", linewidth=1.5)
         for values, colour, style, text in (
@@ -156,7 +152,7 @@ def conventional() -> None:
     from detent.page.draw import draw_figures
 
     (found,) = table().compare()
-    draw_figures(found.figures()[:1], FOLDER / "conventional.svg")
+    draw_figures(found.figures()[:1], FOLDER / "conventional.png")
 
 
 # -- the literal form --------------------------------------------------------------------------------------------------
@@ -185,7 +181,7 @@ def start_angles() -> None:
     """Where the literal form throws the table back, over time and over speed and start angle."""
     from detent.methods.rotary_table.derive import TableFigures
 
-    with picture("start-angles.svg", 1, 4.2, columns=2, share_x=False) as (ways, places):
+    with picture("start-angles.png", 1, 4.2, columns=2, share_x=False) as (ways, places):
         for place, colour in ((3.0, BLUE), (1.5, PINK), (0.5, ORANGE)):
             axis = table(f"mechanics.start_angle={place} deg", "method.form=flag", *LITERAL)
             done = jog(axis, 14, FAST, signals=("controller.positioner.angle.position",), every=20)
@@ -225,7 +221,7 @@ def race() -> None:
     )  # fmt: skip
     registers = tuple(f"controller.positioner.{name}" for name in ("dr", "s4", "rollovers"))
     signals = (*registers, "plant.train.motor.velocity")
-    with picture("race.svg", 3, 6.2) as (lag, signal, speed):
+    with picture("race.png", 3, 6.2) as (lag, signal, speed):
         for text, update, colour in cases:
             axis = table("mechanics.start_angle=100 deg", f"method.update={update}", "method.task_phase=0.2 ms")
             done = jog(axis, 6.3, FAST, signals=signals, every=1)
@@ -274,7 +270,7 @@ def feed() -> None:
     """Mean speed of manual feed over the dial, and the way at its slowest."""
     # Whole counts round the dial to 0.49 deg/s: below half of that there is no jog at all.
     speeds = np.geomspace(0.06, 60, 120)
-    with picture("manual-feed.svg", 1, 4.2, columns=2, share_x=False) as (error, way):
+    with picture("manual-feed.png", 1, 4.2, columns=2, share_x=False) as (error, way):
         for text, colour, overrides in FEEDS:
             axis = feed_axis(overrides)
             least = 0.5 * np.degrees(axis.spec.count) / axis.spec.method.strobe_period
@@ -311,7 +307,7 @@ def sequence() -> None:
     result, part = done.result, done.trace
     begin = result.time_ready
     t = part.time - begin
-    with picture("sequence.svg", 3, 6.4) as (angle, lines, lag):
+    with picture("sequence.png", 3, 6.4) as (angle, lines, lag):
         angle.plot(t, np.degrees(part["controller.positioner.angle.position"] * axis.spec.count), color=BLUE)
         angle.set_ylabel("table angle [deg]")
         angle.set_yticks(range(0, 1081, 180))
@@ -337,9 +333,3 @@ def sequence() -> None:
 
 
 FIGURES = (composition, walk, conventional, start_angles, race, feed, sequence)
-
-
-def draw_all() -> None:
-    """Draw every figure of this file."""
-    draw_stale(FIGURES, Path(__file__))
-    feed_axis.cache_clear()

@@ -1,16 +1,14 @@
-"""The figures of the two servos: each is drawn from a run of the simulation, or from its exact model, at build time.
+"""The figures of the two servos: each is drawn from a run of the simulation, or from its exact model.
 
-Called by conf.py; they are drawn again when this file, figures.py or the package has changed. `feedback_table` writes
-a table in place of a picture.
+`feedback_table` writes a table in place of a picture.
 """
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, draw_stale, label, picture
+from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, label, picture
 
 PINK = "#CC79A7"
 LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "fontsize": 9}
@@ -61,7 +59,7 @@ def plus_pulse() -> None:
     third = int(plus.times[np.flatnonzero(plus.values)[2]])
     tick = round(axis.simulated.tick * 1e12)
     shown = axis.timing((third // tick - 4) * tick * 1e-12, 9 * tick * 1e-12, signals=PULSE_SIGNALS).waveforms
-    plot_timing(shown, FOLDER / "plus-pulse.svg", marks=((third, "+ pulse"),))
+    plot_timing(shown, FOLDER / "plus-pulse.png", marks=((third, "+ pulse"),))
 
 
 def absolute_word() -> None:
@@ -81,7 +79,7 @@ def absolute_word() -> None:
         run_converters(converters, r, phase, 0, 3 * n)
         words.append(r.absolute.word)
         errors.append(absolute_error(converters.absolute, r.absolute))
-    with picture("absolute-word.svg", 2, 5.2) as (word, error):
+    with picture("absolute-word.png", 2, 5.2) as (word, error):
         word.plot(steps, words, color=BLUE, drawstyle="steps-mid")
         word.set_ylabel("absolute word R604")
         word.set_yticks([0, n // 2, n])
@@ -112,7 +110,7 @@ def phase_move() -> None:
     t = (part.time - move.begin) * 1e3
     switched = (move.switched - move.begin) * 1e3
     in_speed = (t > 0.05) & (t < switched)
-    with picture("phase-move.svg", 4, 8.4) as (speed, way, end, lines):
+    with picture("phase-move.png", 4, 8.4) as (speed, way, end, lines):
         one = spec.step / spec.sample_period
         speed.plot(t, part["plant.train.velocity"] / one, color=GREY, linewidth=1, label="true speed")
         speed.step(t, part["controller.speed.word"], where="post", color=BLUE, label="speed word")
@@ -148,7 +146,7 @@ def noise() -> None:
     from detent.methods.phase_servo.comparison import compare_noise
     from detent.page.draw import draw_figures
 
-    draw_figures(compare_noise(phase_axis().spec).figures(), FOLDER / "noise.svg")
+    draw_figures(compare_noise(phase_axis().spec).figures(), FOLDER / "noise.png")
 
 
 def hold() -> None:
@@ -156,7 +154,7 @@ def hold() -> None:
     from detent.methods.phase_servo.comparison import compare_hold
     from detent.page.draw import draw_figures
 
-    draw_figures(compare_hold(phase_axis().spec).figures(), FOLDER / "hold.svg")
+    draw_figures(compare_hold(phase_axis().spec).figures(), FOLDER / "hold.png")
 
 
 def clock_order() -> None:
@@ -169,7 +167,7 @@ def clock_order() -> None:
         ("integration clock too fast for the robust gains", ORANGE, ("clock.integrate_tap=11",)),
     )
     push = ("disturbance.push.force=3 N", "disturbance.push.at=35 ms", "disturbance.push.duration=10 s")
-    with picture("clock-order.svg", 1, 3.4) as (area,):
+    with picture("clock-order.png", 1, 3.4) as (area,):
         for text, colour, overrides in cases:
             axis = phase_axis(*push, *overrides)
             sample = axis.simulated.sample_job().moves[0]
@@ -200,7 +198,7 @@ def lumpy_speed() -> None:
     """Counted pulses of each window, and the drive word that they make with and without the filter."""
     found = feedback()
     conventional, filtered = found.cases[:2]
-    with picture("lumpy-speed.svg", 3, 5.8) as (count, plain, smooth):
+    with picture("lumpy-speed.png", 3, 5.8) as (count, plain, smooth):
         t = (conventional.t - conventional.t[0]) * 1e3
         keep = t < 100
         n = conventional.speed_word / conventional.scale
@@ -237,7 +235,7 @@ def filter_answer() -> None:
     for n in counts:
         filter_speed(p, r, n)
         words.append(r.output)
-    with picture("filter-answer.svg", 1, 3.4, columns=2, share_x=False) as (pulse, gain):
+    with picture("filter-answer.png", 1, 3.4, columns=2, share_x=False) as (pulse, gain):
         k = np.arange(len(counts)) - 2
         pulse.step(k, [method.scale * n for n in counts], where="post", color=ORANGE, label="B × n")
         pulse.step(k, words, where="post", color=BLUE, label="filtered")
@@ -286,7 +284,7 @@ def sample_clock() -> None:
     spec = slide().spec
     scale, a = spec.method.scale, spec.method.coefficient
     current = spec.drive.current_per_count * 1500 / spec.gain  # K = 1500: stable with each of the three
-    with picture("sample-clock.svg", 2, 5.4) as (word, error):
+    with picture("sample-clock.png", 2, 5.4) as (word, error):
         for ms, colour in ((2.5, GREEN), (5, BLUE), (10, ORANGE)):
             level = scale * RATE * ms * 1e-3
             samples = round(400 / ms)
@@ -309,7 +307,7 @@ def sample_clock() -> None:
 
 def loop_model() -> None:
     """Stop of the simulated axis and of its exact model; how the model loses its stability."""
-    with picture("loop-model.svg", 1, 3.6) as (area,):
+    with picture("loop-model.png", 1, 3.6) as (area,):
         for name, colour, overrides in (
             ("conventional", ORANGE, ("method.filter=none",)),
             ("with filter", BLUE, ()),
@@ -336,7 +334,7 @@ def stability() -> None:
 
     spec = slide(*IDEAL).spec
     gains = np.geomspace(500, 60_000, 300)
-    with picture("stability.svg", 1, 3.6) as (area,):
+    with picture("stability.png", 1, 3.6) as (area,):
         for (name, variant), colour in zip(feedback_variants(spec).items(), (ORANGE, BLUE, PINK, GREEN), strict=True):
             loop = model_of(variant)
             radius = [replace(loop, gain=float(gain)).spectral_radius() for gain in gains]
@@ -361,7 +359,7 @@ def stability() -> None:
 
 def damping() -> None:
     """Stops with the worked numbers and with better damped ones."""
-    with picture("damping.svg", 1, 3.6) as (area,):
+    with picture("damping.png", 1, 3.6) as (area,):
         for text, colour, overrides in (
             ("worked numbers: 5 ms, B 4, A 1/4", BLUE, ()),
             ("5 ms, B 4, A 1/2", GREEN, ("method.coefficient=0.5",)),
@@ -384,16 +382,10 @@ def feedback_table() -> None:
 
     _, heads, rows = feedback().table
     text = table(("", *heads[1:]), [tuple(row) for row in rows])
-    (FOLDER / "feedback.md").write_text(text, encoding="utf-8")
+    (FOLDER / "feedback-table.md").write_text(text, encoding="utf-8")
 
 
 FIGURES = (
     plus_pulse, absolute_word, phase_move, noise, hold, clock_order, lumpy_speed, filter_answer, sample_clock,
     loop_model, stability, damping, feedback_table,
 )  # fmt: skip
-
-
-def draw_all() -> None:
-    """Draw every figure of this file."""
-    draw_stale(FIGURES, Path(__file__))
-    feedback.cache_clear()

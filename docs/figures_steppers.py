@@ -1,17 +1,15 @@
-"""The figures of the stepper envelope: each is drawn from its tables, or from a run with a rotor, at build time.
+"""The figures of the stepper envelope: each is drawn from its tables, or from a run with a rotor.
 
-Called by conf.py; they are drawn again when this file, figures.py or the package has changed. `methods_table` writes a
-table in place of a picture.
+`methods_table` writes a table in place of a picture.
 """
 
 import math
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, draw_stale, label, picture
+from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, label, picture
 
 LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "fontsize": 9}
 MOTOR = "group_a"
@@ -100,7 +98,7 @@ def lost_steps() -> None:
     m = figures_of(*OPEN)
     hz = np.geomspace(200, 4000, 60)
     found = [abs(lost(compute(standing(400, *OPEN), CONSTANT_FREQUENCY, 400, f))) for f in hz.tolist()]
-    with picture("lost-steps.svg", 1, 3.4) as (area,):
+    with picture("lost-steps.png", 1, 3.4) as (area,):
         area.semilogx(hz, found, "o-", color=BLUE, markersize=3.5, linewidth=1)
         for f, text, colour in ((m.natural_hz, "rotor swings", GREY), (m.start_hz, "start frequency", GREEN)):
             area.axvline(f, color=colour, linestyle="--", linewidth=1)
@@ -125,7 +123,7 @@ def torque() -> None:
     hz = np.linspace(0, 5000, 400)
     there = np.array([m.motor.pull_out(f) for f in hz.tolist()]) * 1e3
     used = (m.motor.friction_torque + m.acceleration_torque(1.0) * np.diff(m.ramp.hz**2, append=np.nan) / 2) * 1e3
-    with picture("torque.svg", 1, 3.8, columns=2, share_x=False) as (known, wound):
+    with picture("torque.png", 1, 3.8, columns=2, share_x=False) as (known, wound):
         known.plot(hz, there, color=BLUE, label="pull-out")
         known.plot(hz, there / m.table.drive.torque_safety, color=BLUE, linestyle="--", label="divided by SF")
         known.plot(m.ramp.hz, used, color=ORANGE, label="the ramp takes")
@@ -161,7 +159,7 @@ def ramp() -> None:
     straight = np.sqrt(m.start_hz**2 + 2 * m.linear * n)
     t = np.cumsum(1 / m.ramp.hz) * 1e3
     bend = int(np.searchsorted(m.ramp.hz, m.linear_end))
-    with picture("ramp.svg", 1, 3.4, columns=2, share_x=False) as (index, time):
+    with picture("ramp.png", 1, 3.4, columns=2, share_x=False) as (index, time):
         index.plot(n, straight, "--", color=GREY, label="constant acceleration")
         index.plot(n, m.ramp.hz, color=BLUE, label="ramp list")
         index.set_xlabel("index: steps since the start")
@@ -183,7 +181,7 @@ def turn_envelope() -> None:
     extremes = (f"stepper.{MOTOR}.extremes.turn=30 mm", f"stepper.{MOTOR}.extremes.stop=7.5 mm")
     tables = zoom(*OPEN, *extremes).envelopes()[MOTOR].tables
     reach = len(tables.up.ramp)
-    with picture("envelope-turn.svg", 1, 4.0) as (area,):
+    with picture("envelope-turn.png", 1, 4.0) as (area,):
         area.axhline(0, color="black", linewidth=0.9)
         for table, colour, names in ((tables.up, BLUE, "abc"), (tables.down, ORANGE, "def")):
             low, high = sorted((table.start, table.stop))
@@ -212,7 +210,7 @@ def turn_envelope() -> None:
 
 def zones() -> None:
     """The zones of the example: what `detent envelope` draws."""
-    zoom().envelopes()[MOTOR].save(FOLDER / "zones.svg")
+    zoom().envelopes()[MOTOR].save(FOLDER / "zones.png")
 
 
 def boundary() -> None:
@@ -224,7 +222,7 @@ def boundary() -> None:
         ("envelope", BLUE, 0, "-"), ("A: braking distance", GREEN, BRAKING_DISTANCE, "-"),
         ("B: speed per step", ORANGE, PERMISSIBLE_FREQUENCY, "--"),
     )  # fmt: skip
-    with picture("boundary.svg", 2, 5.0) as (speed, lag):
+    with picture("boundary.png", 2, 5.0) as (speed, lag):
         for text, colour, method, style in cases:
             motor = standing(8000)
             if method:
@@ -260,7 +258,7 @@ def stop_moved() -> None:
         for name in ("controller.rule.position", "controller.rule.direction", "controller.timer.period")
     )
     axis = zoom(*OPEN)
-    with picture("stop-moved.svg", 1, 3.8) as (area,):
+    with picture("stop-moved.png", 1, 3.8) as (area,):
         area.axhline(0, color=GREY, linewidth=0.8)
         for to, colour, width in cases:
             change = Change(15e-3, to)
@@ -296,7 +294,7 @@ def by_hand() -> None:
     asked = np.zeros_like(t)
     for move, jog in zip(done.result.moves, jogs, strict=True):
         asked[(t >= move.begin) & (t < move.begin + jog.duration)] = jog.speed / 5e-6
-    with picture("by-hand.svg", 2, 5.0) as (speed, place):
+    with picture("by-hand.png", 2, 5.0) as (speed, place):
         speed.plot(t, asked, color=GREY, linestyle="--", linewidth=1.2, label="joystick")
         speed.plot(t, hz, color=BLUE, label="motor")
         speed.set_ylabel("step frequency [Hz]")
@@ -344,7 +342,7 @@ def margin() -> None:
     safe = np.linspace(0.5, START_RESERVE**2 / (m.start_hz / m.natural_hz) ** 2, 60)
     promised = np.array([(MOST_USED * torque - 2 * f * step).min() for f in safe])
     promised = np.minimum(promised, MOST_FRICTION * m.motor.holding_torque) * 1e3
-    with picture("step-margin.svg", 1, 4.0) as (area,):
+    with picture("step-margin.png", 1, 4.0) as (area,):
         area.plot(fine, bound, "--", color=GREY, label="torque of the rotor − inertia × acceleration")
         area.plot(factors, most, "o-", color=BLUE, markersize=4, label="no step lost below")
         area.fill_between(safe, 0, promised, color=GREEN, alpha=0.35, linewidth=0, label="reserve of the random tests")
@@ -381,7 +379,7 @@ def jerk() -> None:
     spec = zoom(*OPEN).spec
     listed = smooth_ramp(compare_jerk(spec, MOTOR), spec.stepper[MOTOR].step)
     names = ("controller.timer.period", "plant.rotor.angle", "plant.rotor.commanded")
-    with picture("jerk.svg", 1, 3.8, columns=2, share_x=False) as (speed, start):
+    with picture("jerk.png", 1, 3.8, columns=2, share_x=False) as (speed, start):
         for text, colour, ramp_list in (("envelope", BLUE, None), ("jerk-limited", ORANGE, listed)):
             motor = standing(way, *OPEN)
             if ramp_list is not None:
@@ -414,15 +412,9 @@ def methods_table() -> None:
     only = spec.model_copy(update={"stepper": {MOTOR: spec.stepper[MOTOR]}})
     _, heads, rows = compare_steps(only)[0].table
     text = table(tuple(heads), [tuple(row) for row in rows])
-    (FOLDER / "step-methods.md").write_text(text, encoding="utf-8")
+    (FOLDER / "step-methods-table.md").write_text(text, encoding="utf-8")
 
 
 FIGURES = (
     lost_steps, torque, ramp, turn_envelope, zones, boundary, stop_moved, by_hand, margin, jerk, methods_table,
 )  # fmt: skip
-
-
-def draw_all() -> None:
-    """Draw every figure of this file."""
-    draw_stale(FIGURES, Path(__file__))
-    figures_of.cache_clear()

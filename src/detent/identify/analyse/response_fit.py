@@ -190,7 +190,9 @@ class Fit:
 
     def spread(self, tell: Callable[[Values], dict[str, float]]) -> dict[str, tuple[float, float]]:
         """Values and standard errors of functions of the parameters, by their slopes (delta method); inf for none."""
-        steps = np.diag([0.01 * size or 1e-9 for size in np.sqrt(np.diag(self.covariance)).tolist()])
+        # A parameter that the lines do not determine may be uncertain by decades: the slope is that at its value.
+        reach = np.minimum(np.sqrt(np.diag(self.covariance)), np.maximum(np.abs(self.parameters), 1.0))
+        steps = np.diag([0.01 * size or 1e-9 for size in reach.tolist()])
         sides = [(tell(self.parameters + step), tell(self.parameters - step), 2 * step.sum()) for step in steps]
         found: dict[str, tuple[float, float]] = {}
         for name, value in tell(self.parameters).items():

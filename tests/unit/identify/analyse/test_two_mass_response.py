@@ -5,6 +5,7 @@ import pytest
 from scipy import linalg
 
 from detent.identify.analyse.response_fit import (
+    Fit,
     LoadModel,
     RigidModel,
     TwoMassModel,
@@ -102,3 +103,14 @@ def test_every_parameter_counts(model):
         changed = np.r_[start, 0.0, 0.0]
         changed[index] += 0.01
         assert np.abs(respond_sampled(model, changed, FREQUENCY, HOLD) / before - 1).max() > 1e-5
+
+
+def test_what_the_lines_do_not_determine_is_uncertain_and_no_overflow():
+    """The fit of a recording without any answer: its gain is uncertain by decades."""
+    parameters, errors = np.array([1.1e7, 12.95, 9e-5]), np.array([6.4e11, 5.6e4, 5e-3])
+    fit = Fit(RigidModel(1), parameters, 1.0, np.diag(errors**2), 10.0, 0.0, np.ones((1, 3)), np.ones((1, 3), complex))
+    found = fit.spread(lambda p: {"viscous": float(p[0]), "gain": float(np.exp(p[1])), "delay": float(p[2])})
+    gain = float(np.exp(parameters[1]))
+    assert found["viscous"] == pytest.approx((parameters[0], errors[0]))
+    assert found["gain"] == pytest.approx((gain, gain * errors[1]), rel=0.01)
+    assert found["delay"] == pytest.approx((parameters[2], errors[2]))
