@@ -315,7 +315,7 @@ length it shows truly. In {named} cells a fault was reported. In {nothing} nothi
 that is stuck while nothing moves is no fault yet. In {unseen} the position that is shown is no longer the true one, and
 nothing in the controller could tell: an open loop, or pulses that are lost one by one. In {trusted} cells a fault was
 reported and its rule keeps the trust in a position that is wrong: a following error alone does not tell a dead channel
-of an encoder from a heavy load.
+of an encoder from a heavy load. From these it need not come back by itself.
 
 States: the fault is there before the axis is enabled and sent on its way (power-up); the axis holds (rest), moves,
 comes to rest after a stop, or stands in a quick stop. Each cell gives the fault, the time until it was reported, and an

@@ -91,6 +91,7 @@ def serve(  # noqa: PLR0913 - as all of its kind
         if d.do == REST_OFF:
             lines.enable = 0
         elif d.do == HOLD and lines.enable == 0 and s.state != ACQUIRE:
+            c.law.integral = 0  # it has grown while something held the carriage
             acquire(c)
         elif d.do == TRAVEL:
             set_out(q, c, memory, o)
