@@ -17,6 +17,7 @@ from detent.errors import DetentError
 File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=False)]
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
 PERIOD = "Time between two periods of the loop; a machine without real-time priority may need a longer one."
+DRIVE = "What is at the other end of the lines: sim, or canopen:INTERFACE:CHANNEL@NODE, as canopen:socketcan:can0@5."
 FOR = "End after so many seconds by itself."
 WORD = "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home."
 
@@ -28,6 +29,7 @@ def live(
     motor: Annotated[str, option("--motor", "NAME", "Which motor, of a file with several.")] = "",
     speed: Annotated[float, option("--speed", "", SPEED)] = 1.0,
     period: Annotated[str, option("--period", "", PERIOD)] = "1 ms",
+    drive: Annotated[str, option("--drive", "NAME:ADDRESS", DRIVE)] = "sim",
     seconds: Annotated[float | None, option("--for", "SECONDS", FOR, min=0.0)] = None,
     *,
     as_json: Json = False,
@@ -39,9 +41,12 @@ def live(
     from detent.operate.watchdog import Watchdog
 
     place, (board, memory) = Place(file), shared_memory()
-    host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period), memory=memory)
+    host, name = make_host(
+        file, overrides or [], motor=motor, speed=speed, period=_seconds(period), memory=memory, drive=drive
+    )
     missing, left, watchdog = host.start(), threading.Event(), Watchdog(host.board, board)
-    session = Session(host, {"name": name, "file": str(file), "simulated": True, "speed": speed})
+    simulated = host.link is None
+    session = Session(host, {"name": name, "file": str(file), "simulated": simulated, "speed": speed})
     channel = place.serve(session)
 
     def leave(_number: int, _frame: object) -> None:
@@ -49,9 +54,12 @@ def live(
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, leave)
-    started = {"name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing}
-    started["watchdog"] = watchdog.id
-    started |= {"state": host.state, "period": session.describe()["period"]}
+    about = session.describe()
+    started = {"name": name, "simulated": simulated, "speed": speed, "channel": str(channel.path)}
+    started |= {"not_permitted": missing, "watchdog": watchdog.id}
+    started |= {"state": host.state, "period": about["period"], "drive": about["drive"]}
+    if host.link is not None:
+        started["hardware"] = host.link.driver.hardware
     if as_json:
         print(json.dumps(started), flush=True)
     else:
@@ -89,7 +97,10 @@ def _tell_start(file: Path, started: dict[str, Any]) -> None:
     """What is running, and how to speak to it."""
     name = shlex.quote(str(file))
     speed = "" if started["speed"] == 1.0 else f", time {started['speed']:g} times as fast"
-    tell(f"{started['name']}: live, SIMULATION{speed}; every {started['period'] * 1e3:g} ms; {started['state']}.")
+    what = "SIMULATION" if started["simulated"] else f"on {started['hardware']}"
+    tell(f"{started['name']}: live, {what}{speed}; every {started['period'] * 1e3:g} ms; {started['state']}.")
+    for fact in started["drive"]:
+        tell(f"  {fact}")
     tell(f'From a second terminal: detent connect {name} enable, then detent connect {name} move_by "5 mm"')
     for one in started["not_permitted"]:
         tell(f"Not permitted: {one}")

@@ -27,7 +27,8 @@ class Session:
         q = self.host.axis.live.operation
         limits = None if q.endless else [q.lowest, q.highest]
         period = self.host.board.loop.period * 1e-9
-        return self.about | {"unit": self.unit, "period": period, "commands": words, "limits": limits}
+        facts = [] if self.host.link is None else [str(fact) for fact in self.host.link.facts]
+        return self.about | {"drive": facts, "unit": self.unit, "period": period, "commands": words, "limits": limits}
 
     def status(self) -> dict[str, Any]:
         """The axis now."""
@@ -52,7 +53,7 @@ class Session:
             found = self.host.ending(command)
         if found is None:
             return None
-        fault = self.host.axis.fault() if found.how == ops.FAILED else ""
+        fault = self.host.axis.fault() if found.how == ops.FAILED else self.host.told(found.why)
         return ended(found.id, found.how, found.why, found.by, fault)
 
     def wait(self, command: int, timeout: float | None = None) -> Ended:

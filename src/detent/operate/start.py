@@ -14,6 +14,7 @@ from detent.methods.load import read_axis
 from detent.methods.registry import METHODS
 from detent.operate.channel import Channel, Connection, channel_of
 from detent.operate.client import LiveAxis
+from detent.operate.drivers.driver import SIMULATED, driver_of
 from detent.operate.host import PERIOD, Host
 from detent.operate.loop import Board
 from detent.operate.session import Session
@@ -42,8 +43,9 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
     wall: bool = True,
     period: float = PERIOD,
     memory: mmap | None = None,
+    drive: str = SIMULATED,
 ) -> tuple[Host, str]:
-    """Host of the simulated axis of a file, and its name."""
+    """Host of the axis of a file, simulated or on a drive, and its name."""
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
         raise DetentError(
             f"speed {speed:g}: time may pass {SPEEDS[0]:g} to {SPEEDS[1]:g} times as fast; choose between"
@@ -56,7 +58,12 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
     method = METHODS[spec.axis.method]
     if not method.lives:
         raise DetentError(f"{file}: the method {spec.axis.method} has no operator yet; simulate it with: detent run")
-    return Host(method, spec, motor=motor, period=period, speed=speed, wall=wall, memory=memory), spec.axis.name
+    driver = driver_of(drive)
+    if driver is not None and speed != 1.0:
+        raise DetentError(f"--drive {drive}: got --speed {speed:g}; expected: none, for a machine keeps its own time")
+    return Host(
+        method, spec, motor=motor, period=period, speed=speed, wall=wall, memory=memory, driver=driver
+    ), spec.axis.name
 
 
 def live(

@@ -109,7 +109,12 @@ def serve(
 
 def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:
     """The axis at power-on, its drive off, to be operated."""
-    host, limits = CascadeHost(spec), motion_limits(spec)
+    return {"": live_of(CascadeHost(spec), operation)}
+
+
+def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Live:
+    """The axis of a host."""
+    spec, limits = host.spec, motion_limits(host.spec)
     host.controller.on = 0
     q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
     q.settled = host.params.controller.limits.window
@@ -127,4 +132,4 @@ def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[s
     def fault() -> str:
         return describe_cause(host) if host.controller.guard.code else ""
 
-    return {"": Live(host.params, host.state, q, memory, host.tick, spec.unit("m"), host.feed, fault)}
+    return Live(host.params, host.state, q, memory, host.tick, spec.unit("m"), host.feed, fault)
