@@ -18,7 +18,7 @@ import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests import live_drive
+from tests import live_drive, live_frames
 from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
 from tests.difference import diff
 from tests.live_bench import MOVED, OPERATED, Bench
@@ -1045,3 +1045,10 @@ def test_32_another_hardware_is_not_enabled(file):
         assert bench.host.state != "operation enabled"
         assert "ready" in STATE_NAMES[drive.state]
         assert ended.reason in session.status()["barred"]["text"]
+
+
+@live_frames.needs_cc
+@pytest.mark.wide
+def test_31_no_wrong_value_comes_over_a_serial_line_and_every_gap_is_counted(tmp_path):
+    """Of 100,000 frames one in a hundred is lost, and one in a hundred has one to eight of its bits turned."""
+    live_frames.receive_all(live_frames.in_c(tmp_path), 100_000, 2)
