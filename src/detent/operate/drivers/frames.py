@@ -17,7 +17,7 @@ FROM = 0xFFFF
 
 
 class Frame(NamedTuple):
-    """What came out of a line."""
+    """A frame without its wrapping."""
 
     kind: int
     number: int
