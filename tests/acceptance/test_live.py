@@ -20,11 +20,12 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import can
 import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests import live_course, live_faults
+from tests import live_course, live_drive, live_faults, live_frames
 from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
 from tests.course_rig import excursions, follow, shortest_stop, turns
 from tests.difference import diff
@@ -45,7 +46,7 @@ from detent.control.head_computer import IDLE
 from detent.control.operation import ABORTED, DONE, REFUSED
 from detent.control.reaction import REACTION_NAMES, RULES, rule_of
 from detent.control.step_rule import INFEASIBLE
-from detent.errors import LOOP_OVERRUN, DetentError
+from detent.errors import DRIVE_LOST, LOOP_OVERRUN, OTHER_HARDWARE, DetentError
 from detent.kernel.loop import advance, replay
 from detent.kernel.registers import CONTROLLER, PLANT, Registers
 from detent.methods.cascade.system import Cascade, along
@@ -1807,6 +1808,44 @@ WAYS = (
     "mouse up", "touch end", "key up", "blur", "hidden tab", "page closed", "context menu", "network cut",
     "a second of lag", "server killed",
 )  # fmt: skip
+# ---- drivers
+
+
+def ready_on(bench: Bench) -> Bench:
+    """Enabled on its drive, the position trusted, the first motion confirmed."""
+    bench.pass_time(0.02)
+    for kind, value in ((ops.TRUST, ops.REFERENCED), (ops.ENABLE, 0.0), (ops.CONFIRM, 0.0)):
+        assert bench.do(kind, float(value)).how == ops.DONE
+    bench.pass_time(0.02)
+    assert bench.host.state == "operation enabled"
+    return bench
+
+
+def moved(bench: Bench) -> tuple[Ending, list[float]]:
+    """A move of the example, and where it was at each exchange."""
+    command, places = bench.host.ask(ops.MOVE_BY, 0.01), []
+    while (ending := bench.host.ending(command)) is None:
+        bench.host.run(1)
+        places.append(bench.answer.position)
+    return ending, places
+
+
+@pytest.mark.wide
+def test_29_a_move_ends_in_its_window_on_a_drive_as_in_the_simulation():
+    with live_drive.drive("test 29") as drive, live_drive.driven("virtual:test 29@5") as bench:
+        facts = {fact.name: fact.value for fact in bench.host.link.facts}
+        assert facts["connection lost (6007)"].startswith("1")
+        assert facts["fault (605E)"].startswith("0")
+        assert facts["following error (6065)"].startswith("off")
+        driven, there = moved(ready_on(bench))
+        assert abs(drive.position * 1e-6 - 0.03) <= bench.spec.method.in_position
+        assert bench.host.board.wires.torn == 0
+    simulated, here = moved(Bench("cascade", period=live_drive.SAMPLE).enable())
+    assert (driven.how, simulated.how) == (ops.DONE, ops.DONE)
+    # The bus takes the sample that the example's drive takes; what differs is the step of its torque.
+    apart = [abs(one - other) for one, other in zip(here, there, strict=False)]
+    assert abs(len(here) - len(there)) < 0.1 * len(here)
+    assert 0.0 < max(apart) < 1e-4
 
 
 @pytest.mark.wide
@@ -2007,3 +2046,82 @@ def test_46_positions_are_taught_typed_and_taken_back(tmp_path: Path) -> None:
     assert found["job"] == "Job done: 4 moves, every one inside its window."
     assert found["jobAt"] == pytest.approx(0.035, abs=1e-4)
     assert "move 2 (9 m), refused" in found["badJob"]
+
+
+def test_29_the_drive_may_be_another_process_on_a_serial_bus():
+    with live_drive.wire() as (near, far), live_drive.served(f"slcan:{far}@5"):
+        live_drive.open_late(f"slcan:{near}@5")
+        with live_drive.driven(f"slcan:{near}@5") as bench:
+            ending, places = moved(ready_on(bench))
+            assert ending.how == ops.DONE
+            assert abs(places[-1] - 0.03) <= bench.spec.method.in_position
+
+
+@pytest.mark.wide
+def test_30_a_cut_cable_takes_the_torque_on_both_sides_and_nothing_resumes():
+    now = 0.0
+    with live_drive.drive("test 30", clock=lambda: now) as drive, live_drive.driven("virtual:test 30@5") as bench:
+        ready_on(bench)
+        move = bench.host.ask(ops.MOVE_BY, 0.1)
+        bench.pass_time(0.2)
+        link, network = bench.host.link, drive.node.network
+        assert drive.torque != 0
+        bus, network.bus = network.bus, None  # it hears nothing more, and nothing of it is heard
+        network.notifier.stop()
+        link.driver._wait = 1e-4
+        heard, before = bench.host.board.wires.heard, bench.loop.periods
+        while bench.operation.fault == 0:
+            bench.host.run(1)
+        after = bench.loop.deadline - heard
+        assert 3 * live_drive.HEARTBEAT < after * 1e-9 <= 3 * live_drive.HEARTBEAT + 1e-3
+        assert bench.loop.periods - before <= 3 * live_drive.HEARTBEAT / live_drive.SAMPLE + 1
+        lines = bench.host.axis.state.lines
+        assert (bench.operation.fault, lines.enable, lines.command) == (DRIVE_LOST, 0, 0.0)
+        assert bench.host.ending(move) == Ending(move, ops.FAILED, DRIVE_LOST, 0)
+        bench.host.run(1)
+        assert bench.host.state == "fault"
+        now = 0.025
+        drive.watch()
+        assert drive.torque != 0  # as long as it may
+        now = 0.035
+        drive.watch()
+        assert (STATE_NAMES[drive.state], drive.torque, drive.error) == ("fault", 0, 0x8130)
+        assert drive.plant.state.lines.enable == 0
+        # The cable is back: nothing moves until the fault is reset and the axis enabled.
+        network.bus, network.notifier = bus, can.Notifier(bus, network.listeners, 1.0)
+        link.driver._wait = 5.0
+        bench.pass_time(0.05)
+        assert (bench.host.state, drive.torque, STATE_NAMES[drive.state]) == ("fault", 0, "fault")
+        assert bench.do(ops.RESET).how == ops.DONE
+        bench.pass_time(0.05)
+        assert (bench.host.state, STATE_NAMES[drive.state]) == ("switch on disabled", "ready to switch on")
+        ready_on(bench)
+        assert moved(bench)[0].how == ops.DONE
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("file", ["canopen 0x2a.0x1.0x3.0x8", ""])
+def test_32_another_hardware_is_not_enabled(file):
+    wanted = [f'hardware.id="{file}"'] if file else ["method.timeout=2 s"]
+    with live_drive.drive("test 32") as drive, live_drive.driven("virtual:test 32@5", *wanted) as bench:
+        session = Session(bench.host, {})
+        bench.pass_time(0.02)
+        bench.do(ops.TRUST, 2.0)
+        ended = session.wait(session.ask("enable"))
+        assert (ended.how, ended.code) == ("refused", OTHER_HARDWARE)
+        assert "canopen 0x2a.0x1.0x3.0x7" in ended.reason
+        assert file in ended.reason
+        assert bench.do(ops.ORDER, 0.0).how == ops.DONE
+        for order in (1.0, 2.0):
+            bench.do(ops.ORDER, order)
+        bench.pass_time(0.02)
+        assert bench.host.state != "operation enabled"
+        assert "ready" in STATE_NAMES[drive.state]
+        assert ended.reason in session.status()["barred"]["text"]
+
+
+@live_frames.needs_cc
+@pytest.mark.wide
+def test_31_no_wrong_value_comes_over_a_serial_line_and_every_gap_is_counted(tmp_path):
+    """Of 100,000 frames one in a hundred is lost, and one in a hundred has one to eight of its bits turned."""
+    live_frames.receive_all(live_frames.in_c(tmp_path), 100_000, 2)

@@ -39,6 +39,18 @@ class AxisTable(Table, frozen=True):
     method: str
 
 
+class HardwareTable(Table, frozen=True):
+    """What stands at the other end of the wires when the axis runs live without a simulated plant."""
+
+    id: str = required(
+        "what the drive says of itself, as `detent live --drive` shows it: with another one the axis is not enabled",
+        '"canopen 0x2a.0x1.0x3.0x7"',
+        allowed="text of 1 to 80 characters",
+        min_length=1,
+        max_length=80,
+    )
+
+
 class AxisSpec(Table, frozen=True):
     """What the specification of every control method has; the models of `methods.METHODS` derive from it."""
 

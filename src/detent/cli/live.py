@@ -19,6 +19,7 @@ from detent.units import format_quantity
 File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=False)]
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
 PERIOD = "Time between two periods of the loop; a machine without real-time priority may need a longer one."
+DRIVE = "What is at the other end of the lines: sim, or canopen:INTERFACE:CHANNEL@NODE, as canopen:socketcan:can0@5."
 FOR = "End after so many seconds by itself."
 STORE = "Where to keep what survives; by default beside the axis file."
 NO_STORE = "Keep nothing: a simulated axis then begins where its file puts it."
@@ -41,6 +42,7 @@ def live(
     motor: Annotated[str, option("--motor", "NAME", "Which motor, of a file with several.")] = "",
     speed: Annotated[float, option("--speed", "", SPEED)] = 1.0,
     period: Annotated[str, option("--period", "", PERIOD)] = "1 ms",
+    drive: Annotated[str, option("--drive", "NAME:ADDRESS", DRIVE)] = "sim",
     seconds: Annotated[float | None, option("--for", "SECONDS", FOR, min=0.0)] = None,
     store: Annotated[Path | None, option("--store", "PATH", STORE)] = None,
     record: Annotated[Path | None, option("--record", "FILE", RECORD)] = None,
@@ -71,11 +73,18 @@ def live(
     place, where, (board, memory) = Place(file), None if no_store else store or beside(file), shared_memory()
     read = read_axis(file, overrides or [])
     host, name = make_host(
-        file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where, memory=memory
+        file,
+        overrides or [],
+        motor=motor,
+        speed=speed,
+        period=_seconds(period),
+        store=where,
+        memory=memory,
+        drive=drive,
     )
     recorder = _record(host, record) if record else None
     missing, left, watchdog = host.start(), threading.Event(), Watchdog(host.board, board)
-    about = {"name": name, "file": str(file), "simulated": True, "speed": speed}
+    about = {"name": name, "file": str(file), "simulated": host.link is None, "speed": speed}
     session = Session(host, about, _axis_file(read))
     status = session.status()
     audit = Audit(Path(status["store"]["path"] if status["store"] else channel_of(file)).with_suffix(".audit"))
@@ -88,10 +97,11 @@ def live(
         signal.signal(number, leave)
     panel = None if headless else Child(channel.path, at)
     links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
-    started = {
-        "name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing,
-        "state": host.state, "period": session.describe()["period"], "panel": links, "store": status["store"],
-        "unit": session.unit, "watchdog": watchdog.id,
+    told = session.describe()
+    started = about | {
+        "channel": str(channel.path), "not_permitted": missing, "state": host.state, "period": told["period"],
+        "panel": links, "store": status["store"], "unit": session.unit, "watchdog": watchdog.id, "drive": told["drive"],
+        "hardware": host.link.driver.hardware if host.link else "",
     } | {key: status[key] for key in ("position", "trust", "find")}  # fmt: skip
     if as_json:
         print(json.dumps(started), flush=True)
@@ -157,7 +167,10 @@ def _tell_start(file: Path, started: dict[str, Any]) -> None:
     """What is running, and how to speak to it."""
     name = shlex.quote(str(file))
     speed = "" if started["speed"] == 1.0 else f", time {started['speed']:g} times as fast"
-    tell(f"{started['name']}: live, SIMULATION{speed}; every {started['period'] * 1e3:g} ms; {started['state']}.")
+    what = "SIMULATION" if started["simulated"] else f"on {started['hardware']}"
+    tell(f"{started['name']}: live, {what}{speed}; every {started['period'] * 1e3:g} ms; {started['state']}.")
+    for fact in started["drive"]:
+        tell(f"  {fact}")
     for link, role in zip(started["panel"], ("", ", to look only"), strict=False):
         tell(f"Panel{role}: {link} (works once, within ten minutes; another: detent connect {name} link)")
     tell(f'From a second terminal: detent connect {name} enable, then detent connect {name} move_by "5 mm"')

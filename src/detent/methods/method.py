@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from detent.record.trace import Trace
 
 SpecT = TypeVar("SpecT", bound=AxisSpec)
+T = TypeVar("T")
 
 
 class Job(Protocol):
@@ -131,6 +132,31 @@ class Live:
     """Number in the table of faults of those that the method numbers by itself."""
 
 
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """An amplifier and what it moves, at rest: the other end of the lines."""
+
+    params: "Registers"
+    state: "Registers"  # lines and plant
+    sample: Callable[[], None]  # let the time between two samples pass, with the lines as they are at its beginning
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wiring:
+    """The lines of one motor as its drive has them; lines by their paths."""
+
+    lines: "type[Registers]"
+    enable: str  # 1 lets the drive act
+    position: str  # takes the counts of its encoder
+    demand: str  # what is demanded of it
+    count: float  # travel per count [m]
+    turn: float  # counts in a turn of the motor
+    torque: float  # of the motor per demand [N*m]
+    largest: float  # magnitude of the demand
+    sample: float  # time between two exchanges [s]
+    hardware: str  # what the axis file says that the drive says of itself; empty where it says nothing
+
+
 class Work(Protocol):
     """A job done live: the host lays piece after piece ready, and the loop takes them."""
 
@@ -202,6 +228,12 @@ class Method(Protocol[SpecT]):
     lives: ClassVar[str] = ""
     """Place of what makes it live: ``live(spec, operation)`` gives a `Live` by the name of each motor, by "" where
     there is one only; none where it has no operator."""
+    wires: ClassVar[str] = ""
+    """Place of what lets its controller run on a drive: ``wired(spec, operation)`` gives a `Live` without a plant and
+    its `Wiring`, by the name of each motor."""
+    machines: ClassVar[str] = ""
+    """Place of the other half, the drive's amplifier and what it moves: ``machine(spec)`` gives a `Plant` and the same
+    `Wiring`, by the name of each motor."""
     linear_loops: ClassVar[str] = ""
     """Place of its loops as linear systems, by where they are cut open: ``loops(spec)``; none where none is linear."""
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
@@ -317,7 +349,26 @@ class Method(Protocol[SpecT]):
 
     def live(self, spec: SpecT, operation: Callable[..., Any], motor: str = "") -> Live:
         """One motor at power-on, to be operated; by its name where the file has several."""
-        motors: Mapping[str, Live] = self.brought(self.lives)(spec, operation)
+        return self._of_motor(self.brought(self.lives)(spec, operation), spec, motor)
+
+    def wired(self, spec: SpecT, operation: Callable[..., Any], motor: str = "") -> "tuple[Live, Wiring]":
+        """The controller of one motor alone, to be operated on a drive."""
+        return self._of_motor(self._half(self.wires, spec)(spec, operation), spec, motor)
+
+    def machine(self, spec: SpecT, motor: str = "") -> "tuple[Plant, Wiring]":
+        """What stands at the other end of its lines: amplifier and mechanics of the file."""
+        return self._of_motor(self._half(self.machines, spec)(spec), spec, motor)
+
+    def _half(self, place: str, spec: SpecT) -> Callable[..., Any]:
+        if not place:
+            raise DetentError(
+                f"{spec.axis.name}: got an axis of the method {self.name} and a drive; expected: a method whose lines "
+                "a drive has; run it live without --drive"
+            )
+        return self.brought(place)
+
+    def _of_motor(self, motors: Mapping[str, T], spec: SpecT, motor: str) -> T:
+        """What belongs to a motor; its name is needed where the file has several."""
         if not motor and len(motors) == 1:
             return next(iter(motors.values()))
         if motor not in motors:

@@ -17,8 +17,9 @@ from detent.axisfile.tables import AxisSpec
 from detent.control import operation as ops
 from detent.control.axis_states import STATE_NAMES
 from detent.control.operation import ENDS, OperationParams
-from detent.errors import NO_MARK, DetentError
+from detent.errors import NO_MARK, OTHER_HARDWARE, DetentError
 from detent.methods.method import Live, Method, Work
+from detent.operate.drivers.driver import Driver, Link
 from detent.operate.faults import Faults
 from detent.operate.keeper import Keeper
 from detent.operate.loop import INBOX, PULLS, Board, run_loop
@@ -128,16 +129,27 @@ class Host:
     def __init__(  # noqa: PLR0913 - an axis and its clock
         self, method: Method[Any], spec: AxisSpec, *, motor: str = "", period: float = PERIOD, speed: float = 1.0,
         wall: bool = True, careful: bool = True, channels: Sequence[str] = (), store: Store | None = None,
-        stated: bool = True, memory: mmap | None = None,
+        stated: bool = True, memory: mmap | None = None, driver: Driver | None = None,
     ) -> None:  # fmt: skip
         make = operation_params(careful=int(careful))
         self.method = method.name
-        self.axis: Live = method.live(spec, make, motor)
         self.board: Any = Board() if memory is None else Board.from_buffer(memory)
+        self.link: Link | None = None
+        if driver is None:
+            self.axis: Live = method.live(spec, make, motor)
+        else:
+            self.axis, wiring = method.wired(spec, make, motor)
+            if not math.isclose(wiring.sample, period):
+                raise DetentError(
+                    f"{spec.axis.name}: got a loop of {period * 1e3:g} ms on a drive, and samples of "
+                    f"{wiring.sample * 1e3:g} ms; expected: the same, for the lines change once in a period; "
+                    f'try: --period "{wiring.sample * 1e3:g} ms", or samples of {period * 1e3:g} ms'
+                )
+            self.link = Link(driver, wiring, self.board.wires)
         loop = self.board.loop
         loop.period, loop.ticks, loop.wall = round(period * 1e9), period * speed / self.axis.tick, int(wall)
-        self.board.operation.trust = ops.REFERENCED
-        self.board.simulated = int(bool(self.axis.places))
+        self.board.operation.trust = ops.REFERENCED if driver is None else ops.NOT_KNOWN
+        self.board.simulated = int(driver is None and bool(self.axis.places))
         self.scope = Scope(self.board, type(self.axis.state), channels)
         self.log, self.faults = Log(), Faults(self)
         self._ids = self._read = self._noted = self._pulls = 0
@@ -164,6 +176,14 @@ class Host:
         return done
 
     def _run(self, periods: int) -> int:
+        if self.link is not None and not self.is_running:  # no wall clock: an exchange, then a period
+            for _ in range(periods):
+                self.link.exchange()
+                self._run_loop(1)
+            return periods
+        return self._run_loop(periods)
+
+    def _run_loop(self, periods: int) -> int:
         axis = self.axis
         return run_loop(
             axis.params, axis.state, axis.live, axis.memory, self.board, self.scope.ring, self.scope.of_board,
@@ -178,18 +198,20 @@ class Host:
     def start(self) -> list[str]:
         """Run the loop in a thread of its own; gives what the system did not permit."""
         self.log.bound(KEPT)
-        self.run(0)  # compiles
+        self._run_loop(0)  # compiles
         self.board.loop.deadline = 0
         ready, missing = threading.Event(), list[str]()
 
         def loop() -> None:
             missing.extend(ask_for_time())
             ready.set()
-            self._run(1 << 62)
+            self._run_loop(1 << 62)
 
         self._thread = threading.Thread(target=loop, name="loop", daemon=True)
         self._thread.start()
         ready.wait()
+        if self.link is not None:
+            self.link.start()
         self.run_until_ready()
         return missing
 
@@ -228,6 +250,8 @@ class Host:
             self._thread.join()
             self._thread = None
             give_back()
+        if self.link is not None:
+            self.link.close()
 
     def _until(self, met: Callable[[], bool]) -> None:
         """Let time pass until something holds, but not for ever; a few periods at least, for the loop to see a line."""
@@ -349,6 +373,10 @@ class Host:
                 return found
             self.run(1)
         raise TimeoutError(f"command {command} has not ended within {periods} periods")
+
+    def told(self, reason: int) -> str:
+        """What is known of a reason beyond its text."""
+        return self.link.told if self.link is not None and reason == OTHER_HARDWARE else ""
 
     @property
     def state(self) -> str:

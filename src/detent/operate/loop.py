@@ -304,7 +304,7 @@ def run_loop(  # noqa: PLR0913 - an axis, how it is operated, and who sees it
             take_lines(b.wires, b.operation, r.lines, now)
         run_period(p, r, q, memory, b, *feed)
         if b.wires.driven:
-            give_lines(b.wires, r.lines)
+            give_lines(b.wires, b.operation, r.lines)
         write_ring(r, b, ring, of_board, of_axis)
         done += 1
         if loop.wall:

@@ -50,10 +50,11 @@ class Session:
         limits = None if q.endless else [q.lowest, q.highest]
         period = self.host.board.loop.period * 1e-9
         channels = [{"name": name, "unit": unit, "help": help_} for name, (_, unit, help_) in self._signals.items()]
+        facts = [] if self.host.link is None else [str(fact) for fact in self.host.link.facts]
         return self.about | {
             "unit": self.unit, "period": period, "commands": words, "limits": limits, "channels": channels,
             "injections": can_inject, "method": self.host.method, "max_speed": self.host.axis.speed,
-            "view": dict(self.host.axis.view),
+            "view": dict(self.host.axis.view), "drive": facts,
         }  # fmt: skip
 
     def status(self) -> dict[str, Any]:
@@ -135,7 +136,7 @@ class Session:
             found = self.host.ending(command)
         if found is None:
             return None
-        fault = self.host.axis.fault() if found.how == ops.FAILED else ""
+        fault = self.host.axis.fault() if found.how == ops.FAILED else self.host.told(found.why)
         told = ended(found.id, found.how, found.why, found.by, fault)
         trouble = self.host.keeper.trouble if self.host.keeper and found.why == NO_MARK else ""
         return replace(told, reason=f"{told.reason} ({trouble})") if trouble else told

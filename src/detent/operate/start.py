@@ -15,6 +15,7 @@ from detent.methods.registry import METHODS
 from detent.operate.audit import Audit
 from detent.operate.channel import Channel, Connection, channel_of
 from detent.operate.client import LiveAxis
+from detent.operate.drivers.driver import SIMULATED, driver_of
 from detent.operate.host import PERIOD, Host, operation_params
 from detent.operate.loop import Board
 from detent.operate.opening import store_path
@@ -46,8 +47,12 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
     period: float = PERIOD,
     store: Path | str | None = None,
     memory: mmap | None = None,
+    drive: str = SIMULATED,
 ) -> tuple[Host, str]:
-    """Host of the simulated axis of a file, and its name; `store` is where it keeps what survives, None nowhere."""
+    """Host of the axis of a file, simulated or on a drive, and its name.
+
+    `store` is where it keeps what survives, None nowhere.
+    """
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
         raise DetentError(
             f"speed {speed:g}: time may pass {SPEEDS[0]:g} to {SPEEDS[1]:g} times as fast; choose between"
@@ -60,7 +65,11 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
     method = METHODS[read.spec.axis.method]
     if not method.lives:
         raise DetentError(f"{file}: the method {method.name} has no operator yet; simulate it with: detent run")
+    driver = driver_of(drive)
+    if driver is not None and speed != 1.0:
+        raise DetentError(f"--drive {drive}: got --speed {speed:g}; expected: none, for a machine keeps its own time")
     chosen: dict[str, Any] = {"motor": motor, "period": period, "speed": speed, "wall": wall, "memory": memory}
+    chosen |= {"driver": driver, "stated": driver is None}
     if store is None:
         return Host(method, read.spec, **chosen), read.spec.axis.name
     motors = method.sensors(read.spec)
@@ -69,7 +78,8 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
         method.live(read.spec, operation_params(), motor)  # says what there is
     opened = Store(Path(store) if store else store_path(file, one), motors[one])
     try:
-        return Host(method, stand(read, one, opened).spec, store=opened, **chosen), read.spec.axis.name
+        spec = stand(read, one, opened).spec if driver is None else read.spec
+        return Host(method, spec, store=opened, **chosen), read.spec.axis.name
     except BaseException:
         opened.close()
         raise

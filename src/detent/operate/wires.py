@@ -8,7 +8,7 @@ the loop goes by what it knows; a drive that it has heard nothing of for too lon
 import ctypes
 from typing import Any
 
-from detent.control.operation import Operation, lose_torque
+from detent.control.operation import Operation, fail, lose_torque
 from detent.errors import DRIVE_LOST
 from detent.kernel.compiled import byte_at, put_byte
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, i2_array, i8, register, u1, u1_array, u2
@@ -36,6 +36,8 @@ class Wires(Registers):
     torn: i8 = register("records of the driver whose sum was wrong", unit="count")
     heard: i8 = register("when the last one was taken", unit="ns")
     lost: i8 = register("times that the drive was silent for too long", unit="count")
+    told: u2 = register("fault of the drive that the loop has acted on", unit="code")
+    state: u1 = register("state of the axis, as it was when the controller last said something", unit="code")
     given: i8 = register("records by the loop", unit="count")
     sum: i8 = register("sum over the last one", unit="code")
     output: u1_array = register("lines that the controller writes, two records", unit="code", length=2 * MOST)
@@ -67,7 +69,9 @@ def take_lines(w: Wires, o: Operation, lines: Any, now: int) -> None:
     o.barred = w.barred if w.taken else DRIVE_LOST
     if w.fault:
         o.barred = w.fault
-        lose_torque(o, w.fault)
+        if w.fault != w.told:
+            fail(o, w.fault)
+    w.told = w.fault
     if now - w.heard > w.silence:
         w.lost += 1 if before != DRIVE_LOST else 0
         o.barred = DRIVE_LOST
@@ -75,8 +79,9 @@ def take_lines(w: Wires, o: Operation, lines: Any, now: int) -> None:
 
 
 @step
-def give_lines(w: Wires, lines: Any) -> None:
+def give_lines(w: Wires, o: Operation, lines: Any) -> None:
     """What the controller says now."""
+    w.state = o.state
     number = w.given + 1
     first = (number & 1) * MOST
     for k in range(w.outs):

@@ -95,12 +95,12 @@ class Ended:
         return asdict(self)
 
 
-def ended(id_: int, how: int, why: int, by: int, fault: str) -> Ended:
-    """What is told of an ending; `fault` is the sentence of a fault that the method knows."""
+def ended(id_: int, how: int, why: int, by: int, known: str) -> Ended:
+    """What is told of an ending; `known` is the sentence of who knows more of it than its text says."""
     name = ops.ENDINGS[how]
     if how == ops.ABORTED:
         return Ended(id_, name, 0, f"command {by} took its place" if by else "a stop ended it")
-    text = fault if how == ops.FAILED and fault else REFUSAL_TEXT.get(why, "") if why else ""
+    text = known or REFUSAL_TEXT.get(why, "")
     reason, _, remedy = text.partition("; ")
     return Ended(id_, name, why, reason, remedy)
 
@@ -142,6 +142,7 @@ def status_of(host: Any, fault: str) -> dict[str, Any]:
         "at_end": _end_of(host.axis.live.operation, o), "in_window": bool(a.near),
         "ready": bool(a.ready), "trust": TRUSTS[o.trust], "confirmed": bool(o.confirmed),
         "fault": {"code": int(o.fault), "text": fault or REFUSAL_TEXT.get(o.fault, "")} if o.fault else None,
+        "barred": {"code": int(o.barred), "text": host.told(o.barred) or REFUSAL_TEXT[o.barred]} if o.barred else None,
         "running": {"id": int(o.running), "command": kind} if o.running else None, "epoch": int(o.epoch),
         "client": int(o.client), "last_stop": o.last_stop,
         "loop": {
@@ -185,6 +186,8 @@ def _why_no_torque(status: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield f"fault {fault['code']}: {fault['text']}", "wait until it has come to rest"
     elif fault:
         yield f"fault {fault['code']}: {fault['text']}", "mend its cause, then reset"
+    if status["barred"]:
+        yield f"{status['barred']['text']} ({status['barred']['code']})", "then enable"
     if not status["ready"]:
         yield "the axis is not ready yet", "wait; after power-on it takes its first position"
     elif state == "quick stop active":

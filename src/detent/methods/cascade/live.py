@@ -169,7 +169,12 @@ def serve(  # noqa: PLR0913 - as all of its kind
 
 def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:
     """The axis at power-on, its drive off, to be operated."""
-    host, limits = CascadeHost(spec), motion_limits(spec)
+    return {"": live_of(CascadeHost(spec), operation)}
+
+
+def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Live:
+    """The axis of a host."""
+    spec, limits = host.spec, motion_limits(host.spec)
     host.controller.on = 0
     host.params.controller.guard.softly = SOFT
     q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
@@ -189,13 +194,11 @@ def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[s
     def fault() -> str:
         return describe_cause(host) if host.controller.guard.code else ""
 
-    return {
-        "": Live(
-            host.params, host.state, q, memory, host.tick, spec.unit("m"), spec.limits.speed,
-            {"title": "Cascade loop"}, host.feed, fault,
-            places=places(spec, host.params, host.period), limits=guard_limits(spec),
-        )
-    }  # fmt: skip
+    return Live(
+        host.params, host.state, q, memory, host.tick, spec.unit("m"), spec.limits.speed,
+        {"title": "Cascade loop"}, host.feed, fault,
+        places=places(spec, host.params, host.period), limits=guard_limits(spec),
+    )  # fmt: skip
 
 
 def guard_limits(spec: CascadeSpec) -> dict[int, float]:

@@ -43,6 +43,7 @@ class CascadeMethod(Method[CascadeSpec]):
         "Neglected: saturation, quantization, Coulomb and Stribeck friction; both masses move, backlash is closed.",
     )
     lives = "live:live"
+    wires, machines = "wired:wired", "wired:machine"
     compares = ("comparison:compare_profiles",)
     reports = "page:cascade_page"
     says = "{job}: every move was in position on {axis}.", "Not done: {failure}"

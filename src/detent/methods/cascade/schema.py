@@ -13,6 +13,7 @@ from detent.axisfile.motion import unit_in
 from detent.axisfile.tables import (
     AxisSpec,
     AxisTable,
+    HardwareTable,
     HomeTable,
     MotionProtectionTable,
     MotorTable,
@@ -276,6 +277,7 @@ class CascadeSpec(AxisSpec, frozen=True):
     protection: MotionProtectionTable = Field(default_factory=MotionProtectionTable)
     home: HomeTable | None = None
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
+    hardware: HardwareTable | None = None
 
     def unit(self, linear: str) -> str:
         """Unit of a quantity of this axis, by that of a linear axis: ``spec.unit("N")`` is ``"N*m"`` if it turns."""

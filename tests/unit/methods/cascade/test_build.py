@@ -116,7 +116,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 # Keys of a rotary axis, of what is said about it, and of the host that runs it.
 ROTARY = {"axis.motion", "mechanics.pendulum"}
-SAID = {"axis.name", "axis.method", "motor.max_current"}
+SAID = {"hardware.id", "axis.name", "axis.method", "motor.max_current"}
 HOST = {"method.timeout"}
 
 GUARDED = {

@@ -1,0 +1,1 @@
+"""How other people's software reaches an axis, or what stands in for a machine."""

@@ -1,0 +1,1 @@
+"""What may stand at the other end of an axis's lines when that is no simulated plant."""
