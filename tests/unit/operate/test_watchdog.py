@@ -168,7 +168,7 @@ def test_a_stopped_loop_is_found_in_time_and_does_not_go_on(tmp_path):
 @pytest.mark.wide
 @pytest.mark.process
 @pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="the board is found by its name under /proc")
-def test_a_killed_loop_is_found_at_once_and_its_watchdog_ends(tmp_path):
+def test_a_killed_loop_is_found_in_time_and_its_watchdog_ends(tmp_path):
     with running(tmp_path) as (process, said, board, channel), detent.connect(channel) as axis:
         axis.enable()
         assert is_there(said["watchdog"])
