@@ -172,6 +172,11 @@ REFUSAL_TEXT: dict[int, str] = {
     230: "the head is looking for its frames or measures itself; wait until that is over, or stop it",
     231: "the head came to rest farther from its target than a stop may miss it; look for what blocks or drives it",
     232: "the axis computer did not do it, and what it answered stands in its status byte; mend that and ask again",
+    341: "the reference was not found: no switch and no hard stop on the whole way, or something else holds the axis; "
+    "look at the switch and its lead, at home.direction, and for what is in the way, then home again",
+    342: "the home switch stayed on when the axis backed off; look at the switch and its lead, or lengthen back_off",
+    343: "the axis began on its home switch and did not come off it; look at the switch and at home.direction",
+    344: "no index mark came within a turn behind the edge of the switch; look at the encoder's index line",
 }
 """Why an operation refuses a command, or ends one that it had taken (control.operation)."""
 

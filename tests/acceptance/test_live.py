@@ -23,8 +23,10 @@ from numpy.typing import NDArray
 from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
 from tests.difference import diff
 from tests.live_bench import MOVED, OPERATED, Bench
+from tests.live_home import WAYS, Lost, zeros
 
 import detent
+from detent.control import homing
 from detent.control import operation as ops
 from detent.control.axis_states import ORDER_NAMES, STATE_NAMES, ordered
 from detent.control.guard import FOLLOWING, STUCK
@@ -1189,3 +1191,119 @@ def test_46_a_table_goes_to_its_own_numbers_and_to_those_that_were_taught(tmp_pa
         assert math.degrees(axis.position) % 360 == pytest.approx(10.0, abs=0.01)
         with pytest.raises(detent.DetentError, match="202"):
             axis.go_to(55)
+
+
+# ---- homing
+
+REPEATS = {"contact": (2e-6, 6e-6, 2e-6), "switch": (-2e-6, 4e-6, 4e-6), "index": (-1e-6, 1e-6, 2e-6)}
+"""Of each way: between what the zero lies [m], and within what it repeats [m]. A hard stop gives way under effort."""
+
+
+def check_zeros(way: str, found: list[float]) -> None:
+    """The same zero each time, and no better than a count and a sample let it."""
+    lowest, highest, spread = REPEATS[way]
+    assert lowest < min(found)
+    assert max(found) < highest
+    assert 0.0 < max(found) - min(found) < spread
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_22_homing_finds_the_same_zero(way):
+    check_zeros(way, zeros(way, 3))
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("way", WAYS)
+def test_22_homing_finds_the_same_zero_from_a_hundred_starts(way):
+    check_zeros(way, zeros(way, 100))
+
+
+def spoil(axis: Lost, what: str) -> None:
+    """What goes wrong with switches and marks."""
+    home = axis.axis.params.plant.home
+    if what == "dead":
+        home.present = 0
+    elif what == "stuck on":
+        home.edge = 10.0
+    elif what == "no mark":
+        home.pitch = 0.0
+    elif what == "blocked":
+        stop = axis.axis.params.plant.stop
+        stop.side, stop.place = -1.0, axis.axis.state.plant.machine.load.position - 5e-4
+        stop.stiffness, stop.damping = 1e8, 1e5
+
+
+@pytest.mark.parametrize(
+    ("way", "what", "code"),
+    [("switch", "dead", 341), ("switch", "blocked", 341), ("index", "dead", 341), ("switch", "stuck on", 343),
+     ("index", "no mark", 344)],
+)  # fmt: skip
+def test_22_homing_that_fails_says_why_and_knows_nothing(way, what, code):
+    axis = Lost(way, Random(5))
+    spoil(axis, what)
+    axis.pass_time(0.002)
+    failed = axis.do(ops.HOME)
+    assert (failed.how, failed.why) == (ops.REFUSED, code)
+    axis.pass_time(0.3)
+    assert axis.answer.rests
+    assert (axis.operation.trust, axis.operation.fault, axis.host.state) == (ops.NOT_KNOWN, 0, "operation enabled")
+    assert axis.do(ops.MOVE_TO, 0.01).why == ops.UNREFERENCED
+    assert axis.do(ops.MOVE_BY, 1e-4).how == ops.DONE
+
+
+def test_22_a_switch_that_does_not_clear_fails_the_homing():
+    axis = Lost("switch", Random(5))
+    home = axis.host.ask(ops.HOME)
+    while axis.axis.memory.homing.phase != homing.SEEN:
+        axis.host.run(1)
+    axis.axis.params.plant.home.edge = 10.0
+    assert axis.host.until_ended(home).why == 342
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_22_a_stop_ends_a_homing_anywhere_and_the_position_stays_unknown(way):
+    rng = Random(23)
+    for _ in range(3):
+        axis = Lost(way, rng)
+        home = axis.host.ask(ops.HOME)
+        axis.pass_time(rng.uniform(0.001, 0.4))
+        assert axis.host.ending(home) is None
+        speed = abs(axis.answer.commanded_velocity)
+        at = axis.answer.commanded
+        axis.host.stop()
+        axis.pass_time(0.3)
+        assert axis.host.ending(home) == Ending(home, ops.ABORTED, 0, 0)
+        assert axis.answer.rests
+        assert abs(axis.answer.commanded - at) <= stop_bound(axis, speed, 5.0)
+        assert axis.operation.trust == ops.NOT_KNOWN
+        assert axis.do(ops.HOME).how == ops.DONE  # and it can be begun again, from where that is
+        assert axis.operation.trust == ops.REFERENCED
+
+
+def test_22_a_homing_is_kept_and_found_in_the_store(tmp_path):
+    file = copied(tmp_path, "cascade")
+    with detent.live(file, ["limits.travel=20 mm", "mechanics.start_position=5 mm"], wall=False):
+        pass
+    with detent.live(file, ["limits.travel=20 mm"], wall=False) as axis:
+        assert (axis.status["trust"], axis.status["find"]) == ("unknown", "home")
+        axis.enable()
+        axis.home()
+        assert axis.status["trust"] == "referenced"
+        reference = axis.link.host.keeper.store.reference
+        assert (reference.number, reference.by) == (2, "homing")
+        assert abs(axis.position - axis.link.host.axis.state.plant.machine.motor.position) < 4e-6
+        axis.move_to("10 mm")
+
+
+def test_22_a_table_homes_by_what_its_resolvers_show(tmp_path):
+    file = copied(tmp_path, "rotary_table")
+    with detent.live(file, wall=False):
+        pass
+    with detent.live(file, ["mechanics.start_angle=17 deg"], wall=False) as axis:
+        assert axis.status["trust"] == "unknown"
+        axis.enable()
+        at = axis.position
+        axis.home()
+        assert (axis.status["trust"], axis.position) == ("referenced", at)
+        axis.confirm()
+        axis.go_to(3)

@@ -20,6 +20,7 @@ from detent.files.quantities import (
     Resistance,
     Time,
     TorqueConstant,
+    Velocity,
     Viscosity,
 )
 
@@ -194,6 +195,45 @@ class DisturbanceTable(Table, frozen=True):
 
     push: PushTable | None = None
     lines: InterferenceTable = Field(default_factory=InterferenceTable)
+
+
+class HomeTable(Table, frozen=True):
+    """How a live axis finds its reference; without the table it cannot home."""
+
+    by: Literal["contact", "switch", "index"] = required(
+        "what gives the reference: a hard stop, the edge of a switch, the first index mark behind that edge", '"switch"'
+    )
+    direction: Literal["negative", "positive"] = optional("in which direction it is looked for", "negative")
+    position: Length = optional(
+        "position of the axis at the reference", math.nan, derived="the end of the travel in that direction",
+        ge=-1e5, le=1e5,
+    )  # fmt: skip
+    speed: Velocity = optional("speed of the search", math.nan, derived="limits.speed / 10", gt=0.0, le=1e3)
+    creep: Velocity = optional(
+        "speed at which it is approached from near", math.nan, derived="a tenth of that", gt=0.0, le=1e3
+    )
+    back_off: Length = optional(
+        "way back before it is approached, and after it was found", math.nan, derived="limits.travel / 50",
+        gt=0.0, le=1e3,
+    )  # fmt: skip
+    edge_to_index: Length = optional(
+        "index: way from the edge of the switch back to the mark", math.nan, derived="0.4 turns of the motor",
+        ge=0.0, le=1e3,
+    )  # fmt: skip
+
+    @property
+    def side(self) -> int:
+        """Direction of the search, 1 or -1."""
+        return 1 if self.direction == "positive" else -1
+
+    def completed(self, ends: tuple[float, float], speed: float, pitch: float) -> Self:
+        """The same with what was left to the ends of the travel [m], to the largest speed [m/s] and to a turn [m]."""
+        search = speed / 10 if math.isnan(self.speed) else self.speed
+        derived = {
+            "position": ends[1] if self.side > 0 else ends[0], "speed": search, "creep": search / 10,
+            "back_off": (ends[1] - ends[0]) / 50, "edge_to_index": 0.4 * pitch,
+        }  # fmt: skip
+        return self.model_copy(update={key: new for key, new in derived.items() if math.isnan(getattr(self, key))})
 
 
 class ProtectionTable(Table, frozen=True):

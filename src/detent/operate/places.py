@@ -6,7 +6,7 @@ who commands the axis changes it, others read it.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from detent.control import operation as ops
 from detent.errors import NOT_AT_REST, NOTHING_TO_UNDO, DetentError
@@ -80,7 +80,7 @@ class Places:
         return 0
 
     def _edit(self, store: Store, value: object) -> int:
-        name, text = _pair(value, "a name and a position", example_of(store.sensor.unit))
+        name, text = _pair(value, "a name and a position", "5 mm")
         unit, sensor = store.sensor.unit, store.sensor
         try:
             position = parse_quantity(text, unit) if isinstance(text, str) else float(text)
@@ -93,7 +93,7 @@ class Places:
         return 0
 
     def _rename(self, store: Store, value: object) -> int:
-        store.rename(*_pair(value, "a name and a new one", '"load"'))
+        store.rename(*_pair(value, "a name and a new one", "load"))
         return 0
 
     def _forget(self, store: Store, value: object) -> int:
@@ -124,7 +124,7 @@ def _name(value: object) -> str:
 
 def _pair(value: object, what: str, example: str) -> tuple[str, Any]:
     """What a word with two values is about."""
-    if not isinstance(value, list | tuple) or len(value) != 2:  # pyright: ignore[reportUnknownArgumentType]
-        raise DetentError(f'got {value!r}; expected: {what}, such as ["3", {example.rpartition(" ")[2]}]; give both')
-    first, second = value  # pyright: ignore[reportUnknownVariableType]
-    return _name(first), second
+    pair = cast("list[Any]", value if isinstance(value, list) else [])
+    if len(pair) != 2:
+        raise DetentError(f'got {value!r}; expected: {what}, such as ["3", "{example}"]; give both')
+    return _name(pair[0]), pair[1]

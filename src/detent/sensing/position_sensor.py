@@ -31,6 +31,7 @@ class PositionSensorParams(Registers):
 class PositionSensor(Registers):
     """What has been read."""
 
+    zero: f8 = register("position of count 0", unit="m")
     position: f8 = register("position read", unit="m")
     velocity: f8 = register("velocity of the positions read", unit="m/s")
     place: i8 = register("place of the last sample in the memory", unit="count")
@@ -38,16 +39,25 @@ class PositionSensor(Registers):
 
 
 @step
-def position_of(p: PositionSensorParams, word: EncoderWord) -> float:
+def position_of(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) -> float:
     """Position that a word stands for [m]."""
-    return word.place if p.resolution == 0.0 else word.count * p.resolution
+    return r.zero + (word.place if p.resolution == 0.0 else word.count * p.resolution)
+
+
+@step
+def shift_positions(r: PositionSensor, way: float) -> None:
+    """What was read, and will be, lies elsewhere; nothing has moved."""
+    r.zero += way
+    r.position += way
+    for k in range(MEMORY):
+        r.memory[k] += way
 
 
 @step
 def read_word(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) -> None:
     """Sample: take the word of the encoder."""
     r.place = (r.place + 1) % MEMORY
-    r.memory[r.place] = position_of(p, word)
+    r.memory[r.place] = position_of(p, r, word)
     r.position = r.memory[(r.place - p.delay) % MEMORY]
     before = r.memory[(r.place - p.delay - p.span) % MEMORY]
     r.velocity += p.smoothing * ((r.position - before) / (p.span * p.period) - r.velocity)
@@ -55,6 +65,6 @@ def read_word(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) -> 
 
 def stand_sensor(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) -> None:
     """As if the encoder had shown this word for long."""
-    r.position = position_of(p, word)
+    r.position = position_of(p, r, word)
     r.velocity = 0.0
     r.memory[:] = [r.position] * MEMORY

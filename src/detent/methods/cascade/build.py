@@ -4,7 +4,9 @@ import math
 from typing import Any
 
 from detent.axisfile.blocks import fill_guard, fill_push, samples
+from detent.axisfile.tables import HomeTable
 from detent.control.cascade_law import CascadeLawParams
+from detent.control.homing import HomingParams
 from detent.methods.cascade.controller import CascadeControllerParams
 from detent.methods.cascade.loop import machine_of
 from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec
@@ -14,6 +16,11 @@ from detent.plant.linear_two_mass import fastest_rate
 
 LARGEST_ANGLE = 0.5
 """Fastest rate of the plant times the tick: a swing of that rate then loses 0.02 % of its amplitude per radian."""
+
+WAYS = "contact", "switch", "index"  # as the block of homing numbers them
+DEEPEST = 1e-4  # share of the travel by which the largest effort presses a hard stop in
+LAG = 1e-4  # share of the travel by which a commanded point ahead of an axis that stands tells of a hard stop
+CONTACT_TIME = 0.01  # for so long [s], or half as long as the guard would let it
 
 LONGEST_TICK = 1e-4  # longest tick [s]: a push begins, and a record is written, at whole ticks
 
@@ -36,7 +43,40 @@ def build_cascade(spec: CascadeSpec) -> CascadeParams:
     ticks = sample_ticks(period, fastest_rate(p.plant.machine))
     fill_push(p.plant.push, spec.disturbance.push, period / ticks)
     fill_clocks(p, period / ticks, ticks)
+    if spec.home is not None:
+        _fill_home(p, spec, spec.home)
     return p
+
+
+def _fill_home(p: CascadeParams, spec: CascadeSpec, home: HomeTable) -> None:
+    """The marks of the machine lie where the file says that the axis finds them, or the hard stop does."""
+    if home.by == "contact":
+        stop, period = p.plant.stop, p.plant.machine.period
+        stop.side, stop.place = home.side, home.position
+        mass = spec.mechanics.load_mass if spec.mechanics.coupling else spec.mass
+        stop.stiffness = min(spec.largest_effort / (DEEPEST * spec.limits.travel), mass * (LARGEST_ANGLE / period) ** 2)
+        stop.damping = math.sqrt(stop.stiffness * mass)
+        return
+    marks = p.plant.home
+    marks.present, marks.side, marks.edge = 1, home.side, home.position
+    if home.by == "index":
+        marks.mark, marks.pitch = home.position, spec.mechanics.travel_per_revolution or 0.0
+        marks.edge += home.side * home.edge_to_index
+
+
+def homing_params(spec: CascadeSpec, home: HomeTable) -> HomingParams:
+    """How the controller looks for its reference."""
+    period, travel = spec.method.sample_period, spec.limits.travel
+    turn = spec.mechanics.travel_per_revolution or 0.0
+    count = spec.encoder_of("position").resolution or 1e-9 * travel
+    watches = [time for time in (spec.protection.stuck_time, spec.protection.reversed_time) if time > 0.0]
+    pressed = min([CONTACT_TIME, *(0.5 * time for time in watches)])
+    return HomingParams(
+        way=WAYS.index(home.by), side=home.side, place=home.position, speed=home.speed, creep=home.creep,
+        back=home.back_off, longest=1.2 * travel + home.back_off, pitch=1.2 * turn,
+        lag=max(LAG * travel, 10 * count), grain=1.5 * count, slack=0.1 * pressed,
+        still=max(1, round(pressed / period)),
+    )  # fmt: skip
 
 
 def sample_ticks(sample_period: float, rate: float) -> int:

@@ -11,6 +11,7 @@ from detent.control.guard import Guard, GuardParams, is_overdue, lasting, watch,
 from detent.kernel.loop import HostArray, controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
+from detent.sensing.home_marks import HomeWires
 from detent.sensing.position_sensor import EncoderWord, PositionSensor, PositionSensorParams, read_word
 
 ARRIVED, FAULT = 1, 2  # events
@@ -65,6 +66,7 @@ class CascadeController(Registers):
     samples: i8 = register("samples since power-on", unit="count")
     on: u1 = register("mailbox: 1 while the drive is on, 0 lets the axis coast; a fault clears it")
     guarded: u1 = register("mailbox: 1 while faults switch off")
+    known: u1 = register("mailbox: 1 while the position is known: beyond an end of the travel it is then switched off")
     event: u1 = register("mailbox: 1 in position, 2 fault; nothing goes on until the host has cleared it")
     entry: i8 = register("mailbox: entry of the reference or command that the next sample takes", unit="count")
     reference: CascadeReference = block("what the axis should do")
@@ -82,6 +84,7 @@ class CascadeLines(Registers):
 
     motor: EncoderWord = block("encoder of the motor", by=PLANT)
     load: EncoderWord = block("encoder of the load", by=PLANT)
+    home: HomeWires = block("home switch and index", by=PLANT)
     sync: u1 = register("1 where the encoders latch in the next tick, and the amplifier then takes over", by=CONTROLLER)
     enable: u1 = register("0: the amplifier takes no command", by=CONTROLLER)
     command: f8 = register("command to the amplifier", unit="V", by=CONTROLLER)
@@ -126,9 +129,9 @@ def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> 
     if abs(c.law.command) >= p.limits.breaking:
         pushing = 1 if c.law.command > 0.0 else -1
     place, side = c.load_sensor.position if p.limits.place_on_load else c.motor_sensor.position, 0
-    if not place <= p.limits.highest:
+    if c.known and not place <= p.limits.highest:
         side = 1
-    elif not place >= p.limits.lowest:
+    elif c.known and not place >= p.limits.lowest:
         side = -1
     moved = count - c.count
     c.count = count

@@ -6,16 +6,22 @@ from typing import Any
 import numpy as np
 
 from detent.control.guard import enable_guard
+from detent.control.homing import FAILED, FOUND, GIVE_WAY, IDLE, Homing, HomingParams, Seen, begin, seek
+from detent.control.homing import HALT as HALT_NOW
+from detent.control.homing import RUN as RUN_AT
 from detent.control.operation import (
     BEYOND,
     HALT,
     HOLD,
+    HOME,
     JOG,
     MOVE_BY,
     MOVE_TO,
     NOT_KNOWN,
+    REFERENCED,
     REST_OFF,
     RUN,
+    SEEK,
     TRAVEL,
     Operation,
     OperationParams,
@@ -23,13 +29,14 @@ from detent.control.operation import (
 from detent.kernel.loop import lay_ready, serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
-from detent.methods.cascade.build import motion_limits
+from detent.methods.cascade.build import homing_params, motion_limits
 from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.run import describe_cause
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.method import Live
 from detent.planning.course import Course, CourseLimits, advance, begin_at, come_to_rest, go_to, is_at_rest, run_at
+from detent.sensing.position_sensor import PositionSensor, position_of, shift_positions
 
 
 class CascadeLiveParams(Registers):
@@ -38,6 +45,7 @@ class CascadeLiveParams(Registers):
     operation: OperationParams = block("times and limits")
     look_ticks: i8 = register("ticks between two looks", unit="tick")
     course: CourseLimits = block("what a motion may do")
+    homing: HomingParams = block("how it finds its reference")
     settled: f8 = register("position error that counts as in position", unit="m")
 
 
@@ -46,6 +54,8 @@ class CascadeLive(Registers):
 
     limits: CourseLimits = block("limits of the present motion")
     course: Course = block("the commanded point")
+    homing: Homing = block("how far the search for the reference has come")
+    seen: Seen = block("what the last look of it saw")
 
 
 @step
@@ -56,6 +66,46 @@ def set_limits(q: CascadeLiveParams, memory: CascadeLive, o: Operation) -> None:
     m.lowest, m.highest = q.course.lowest, q.course.highest
     if o.trust == NOT_KNOWN:
         m.lowest, m.highest = -1e9, 1e9
+
+
+@step
+def refer(c: CascadeController, memory: CascadeLive, way: float, o: Operation) -> None:
+    """The reference has been found: all positions are by a way elsewhere than was thought, and nothing moves."""
+    shift_positions(c.motor_sensor, way)
+    shift_positions(c.load_sensor, way)
+    begin_at(memory.course, memory.course.position + way)
+    o.trust = REFERENCED
+
+
+@step
+def search(  # noqa: PLR0913 - as `serve`, and where the axis is
+    q: CascadeLiveParams, p: CascadeControllerParams, c: CascadeController, lines: CascadeLines, memory: CascadeLive,
+    here: PositionSensor, o: Operation,
+) -> int:  # fmt: skip
+    """One look of a homing; gives why it has failed, 0 while it has not."""
+    h, s, d = memory.homing, memory.seen, o.demand
+    s.position, s.ahead = here.position, memory.course.position - here.position
+    s.rests, s.switch, s.marks = 1 if is_at_rest(memory.course) else 0, lines.home.switch, lines.home.marks
+    mark = position_of(p.motor_sensor, c.motor_sensor, lines.home.mark)
+    s.mark = here.position + (mark - c.motor_sensor.position)
+    if d.fresh:
+        o.trust = NOT_KNOWN
+        set_limits(q, memory, o)
+        told = begin(q.homing, h, s)
+    else:
+        told = seek(q.homing, h, s)
+    if told == RUN_AT:
+        top = memory.limits.speed
+        h.velocity = min(max(h.velocity, -top), top)
+        run_at(memory.limits, memory.course, h.velocity)
+    elif told in (HALT_NOW, FAILED):
+        come_to_rest(memory.limits, memory.course)
+    if told == GIVE_WAY or (told == FAILED and s.ahead * h.velocity > 0.0 and h.still > 0):
+        begin_at(memory.course, here.position)
+        c.law.integral = 0.0
+    elif told == FOUND:
+        refer(c, memory, q.homing.place - h.latched, o)
+    return h.code if told == FAILED else 0
 
 
 @step
@@ -82,8 +132,8 @@ def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Ope
 
 @serves(CascadeLiveParams)
 @step
-def serve(
-    q: CascadeLiveParams, p: CascadeControllerParams, c: CascadeController, _lines: CascadeLines, memory: CascadeLive,
+def serve(  # noqa: PLR0913 - as all of its kind
+    q: CascadeLiveParams, p: CascadeControllerParams, c: CascadeController, lines: CascadeLines, memory: CascadeLive,
     o: Operation, *_feed: Any,
 ) -> None:  # fmt: skip
     """One look, before a sample: the next point of the course."""
@@ -91,6 +141,11 @@ def serve(
     here = c.load_sensor if p.feedback.position_on_load else c.motor_sensor
     c.event = 0
     a.refused = lead(q, c, memory, o) if o.demand.fresh else 0
+    if o.demand.do == SEEK and (o.demand.fresh or memory.homing.phase != IDLE):
+        a.refused = search(q, p, c, lines, memory, here, o)
+    elif o.demand.fresh:
+        memory.homing.phase = IDLE
+    c.known = 0 if o.trust == NOT_KNOWN else 1
     if c.on == 0 or before == 0:  # the commanded point is where the axis is
         begin_at(course, here.position)
     advance(memory.limits, course, p.law.period)
@@ -101,7 +156,7 @@ def serve(
     a.error = course.position - here.position
     a.effort = c.law.command / p.law.max_command if c.on else 0.0
     a.limited = c.law.limited
-    a.rests = 1 if is_at_rest(course) else 0
+    a.rests = 1 if is_at_rest(course) and memory.homing.phase == IDLE else 0
     a.near = 1 if abs(a.error) <= q.settled else 0
     a.ready = 1
     a.fault = c.guard.code if c.on == 0 and o.demand.do != REST_OFF else 0
@@ -114,9 +169,10 @@ def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[s
     q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
     q.settled = host.params.controller.limits.window
     ends = spec.limits.lowest, spec.highest
-    q.operation = operation(
-        host.period, host.params.controller.limits.arrival * host.period, ends, MOVE_TO, MOVE_BY, JOG
-    )
+    motions = (MOVE_TO, MOVE_BY, JOG) if spec.home is None else (MOVE_TO, MOVE_BY, JOG, HOME)
+    q.operation = operation(host.period, host.params.controller.limits.arrival * host.period, ends, *motions)
+    if spec.home is not None:
+        q.homing = homing_params(spec, spec.home)
     jerk = limits.jerk if limits.jerk < 1e12 else 0.0
     q.course = CourseLimits(
         speed=limits.speed, acceleration=limits.acceleration, jerk=jerk, lowest=ends[0], highest=ends[1]

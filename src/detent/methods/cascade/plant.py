@@ -1,16 +1,15 @@
 """The machine of a cascade axis: amplifier, motor, coupling and load, both encoders, and who watches them."""
 
-import math
-
 from detent.drive.effort_source import EffortSource, EffortSourceParams, take_command
 from detent.kernel.registers import Registers, block, f8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.methods.cascade.controller import CascadeLines
+from detent.plant.hard_stop import HardStop, stop_force
 from detent.plant.push import Push, push_force
 from detent.plant.two_mass import TwoMass, TwoMassParams
 from detent.plant.two_mass_motion import move_masses
 from detent.sensing.gauge import Gauge, read_gauge
-from detent.sensing.position_sensor import EncoderWord
+from detent.sensing.home_marks import HomeMarks, HomeMarksParams, latch, sense_home
 
 
 class CascadePlantParams(Registers):
@@ -21,6 +20,8 @@ class CascadePlantParams(Registers):
     motor_count: f8 = register("travel per count of the motor's encoder; 0: it shows the position itself", unit="m")
     load_count: f8 = register("travel per count of the load's encoder; 0: it shows the position itself", unit="m")
     push: Push = block("disturbing force on the load")
+    home: HomeMarksParams = block("switch and marks by which it finds its reference")
+    stop: HardStop = block("hard stop at one end of the way of the load")
 
 
 class CascadePlant(Registers):
@@ -29,16 +30,8 @@ class CascadePlant(Registers):
     latched: u1 = register("1 from the latch of the encoders until the amplifier takes its command")
     source: EffortSource = block("amplifier")
     machine: TwoMass = block("motor, coupling and load")
+    home: HomeMarks = block("switch and marks by which it finds its reference")
     gauge: Gauge = block("what an observer sees of the move of the load")
-
-
-@step
-def latch(word: EncoderWord, travel: float, position: float) -> None:
-    """The nearest count of a scale at `position` [m], `travel` [m] per count; without counts the position itself."""
-    if travel == 0.0:
-        word.place = position
-    else:
-        word.count = math.floor(position / travel + 0.5)
 
 
 @step
@@ -54,6 +47,8 @@ def sense(p: CascadePlantParams, plant: CascadePlant, machine: TwoMass, lines: C
     if lines.sync:
         plant.latched = 1
         latch_both(p, machine, lines)
+        if p.home.present:
+            sense_home(p.home, plant.home, lines.home, machine.motor.position, p.motor_count)
 
 
 @hot_step
@@ -64,5 +59,7 @@ def move(p: CascadePlantParams, plant: CascadePlant, machine: TwoMass, tick: int
         machine.effort = plant.source.output
         plant.latched = 0
     machine.external = push_force(p.push, tick)
+    if p.stop.side != 0.0:
+        machine.external += stop_force(p.stop, machine.load.position, machine.load.velocity)
     move_masses(p.machine, machine)
     read_gauge(plant.gauge, tick + 1, machine.load.position, machine.load.velocity)

@@ -13,6 +13,7 @@ from detent.axisfile.motion import unit_in
 from detent.axisfile.tables import (
     AxisSpec,
     AxisTable,
+    HomeTable,
     MotionProtectionTable,
     MotorTable,
     PushTable,
@@ -273,6 +274,7 @@ class CascadeSpec(AxisSpec, frozen=True):
     load_encoder: EncoderTable | None = None
     method: MethodTable = Field(default_factory=MethodTable)
     protection: MotionProtectionTable = Field(default_factory=MotionProtectionTable)
+    home: HomeTable | None = None
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
     def unit(self, linear: str) -> str:
@@ -403,6 +405,9 @@ def fill_derived(spec: CascadeSpec) -> CascadeSpec:
     window, far = max(1e-4 * limits.travel, counts), 0.1 * limits.travel
     derived: dict[str, object] = {"velocity_limit": 1.25 * limits.speed, "in_position": window, "following_error": far}
     spec = spec.changed(mechanics=filled).filled(method=derived)
+    if spec.home is not None:
+        ends, pitch = (limits.lowest, spec.highest), spec.mechanics.travel_per_revolution or 0.0
+        spec = spec.changed(home=spec.home.completed(ends, limits.speed, pitch))
     # What breaks the axis loose takes its weight, too.
     loose = max(spec.friction(1).static, spec.friction(-1).static) + spec.holding
     return spec.filled(protection={"stuck_effort": breaking_effort(loose, spec.largest_effort)})

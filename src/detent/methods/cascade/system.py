@@ -23,6 +23,7 @@ from detent.methods.cascade.plant import CascadePlant, CascadePlantParams, latch
 from detent.plant.linear_two_mass import fastest_rate
 from detent.plant.two_mass import TwoMass, stand_masses
 from detent.sensing import position_sensor
+from detent.sensing.home_marks import stand_home
 
 Numbers = NDArray[np.float64]
 
@@ -111,10 +112,11 @@ def switch_on(p: CascadeParams, r: Cascade, position: float) -> None:
     c, lines = r.controller, r.lines
     stand_masses(r.plant.machine, position)
     latch_both(p.plant, r.plant.machine, lines)
+    stand_home(p.plant.home, r.plant.home, lines.home, position)
     position_sensor.stand_sensor(p.controller.motor_sensor, c.motor_sensor, lines.motor)
     position_sensor.stand_sensor(p.controller.load_sensor, c.load_sensor, lines.load)
     c.reference.position, c.count = position, lines.motor.count
-    c.on = lines.enable = lines.sync = 1
+    c.on = c.known = lines.enable = lines.sync = 1
 
 
 def set_off(p: CascadeParams, r: Cascade, velocity: float) -> None:

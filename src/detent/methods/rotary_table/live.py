@@ -8,11 +8,14 @@ from detent.control.operation import (
     GO,
     HALT,
     HOLD,
+    HOME,
     JOG,
     MOVE_TO,
     NUMBERED,
+    REFERENCED,
     REST_OFF,
     RUN,
+    SEEK,
     TRAVEL,
     Operation,
     OperationParams,
@@ -87,7 +90,9 @@ def serve(  # noqa: PLR0913 - as all of its kind
             r.plus, r.minus = (1, 0) if d.velocity > 0.0 else (0, 1)
         elif d.do == NUMBERED:
             r.number, r.start = d.number, 1
-        elif d.do == TRAVEL and r.state != STANDS:
+        elif d.do == SEEK and r.state == STANDS:  # its resolvers show where in the turn it stands
+            o.trust = REFERENCED
+        elif d.do in (TRAVEL, SEEK) and r.state != STANDS:
             a.refused = BUSY
         elif d.do == TRAVEL:
             set_out(p.positioner, r, round(d.target / q.count), SHORTEST, round(q.speed * d.share * q.dial))
@@ -115,7 +120,7 @@ def live(spec: RotaryTableSpec, operation: Callable[..., OperationParams]) -> di
     strobe = spec.method.strobe_period
     q = TableLiveParams(count=spec.count, dial=spec.per_interrupt(1.0), speed=spec.limits.speed, seconds=strobe)
     q.look_ticks = round(strobe / host.machine.tick)
-    q.operation = operation(strobe, spec.method.in_position_time, (0.0, 0.0), JOG, GO, MOVE_TO)
+    q.operation = operation(strobe, spec.method.in_position_time, (0.0, 0.0), JOG, GO, MOVE_TO, HOME)
     q.operation.endless = 1
     machine: Any = host.machine
     made = Live(

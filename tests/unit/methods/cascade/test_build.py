@@ -18,6 +18,7 @@ from detent.methods.cascade.build import (
     LARGEST_ANGLE,
     LONGEST_TICK,
     build_cascade,
+    homing_params,
     motion_limits,
     sample_ticks,
 )
@@ -134,6 +135,17 @@ GUARDED = {
 }
 """What the guard of the controller is made of."""
 
+HOMED = {
+    "home.by": "contact",
+    "home.direction": "positive",
+    "home.position": "1 mm",
+    "home.speed": "20 mm/s",
+    "home.creep": "1 mm/s",
+    "home.back_off": "8 mm",
+    "home.edge_to_index": "3 mm",
+}
+"""How a live axis finds its reference, and where in the machine that is."""
+
 
 def load(name, *overrides):
     text = example_text(name)
@@ -178,8 +190,18 @@ def test_a_key_changes_the_run(key):
 
 def test_every_key_is_tried():
     keys = {row.key for row in reference_rows("cascade")}
-    assert set(CHANGES) | set(GUARDED) | ROTARY | SAID | HOST == keys
-    assert len(CHANGES) + len(GUARDED) + len(ROTARY | SAID | HOST) == len(keys)
+    assert set(CHANGES) | set(GUARDED) | set(HOMED) | ROTARY | SAID | HOST == keys
+    assert len(CHANGES) + len(GUARDED) + len(HOMED) + len(ROTARY | SAID | HOST) == len(keys)
+
+
+@pytest.mark.parametrize("key", HOMED)
+def test_a_key_changes_how_it_homes(key):
+    given = ("home.by=index",) if key == "home.edge_to_index" else ()
+    specs = [load("cascade", *given, *change) for change in ((), (f"{key}={HOMED[key]}",))]
+    (p, how), (other, otherwise) = ((build_cascade(spec), homing_params(spec, spec.home)) for spec in specs)
+    changed = {*diff(p, other), *diff(how, otherwise)}
+    assert changed
+    assert all(path.startswith("plant.") or "." not in path for path in changed)
 
 
 @pytest.mark.parametrize("key", GUARDED)

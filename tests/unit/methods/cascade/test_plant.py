@@ -5,8 +5,8 @@ import math
 import pytest
 from tests.cascade_rig import SAMPLE_TICKS, Rig, make_params
 
-from detent.methods.cascade.plant import latch
 from detent.methods.cascade.system import set_count
+from detent.sensing.home_marks import latch
 from detent.sensing.position_sensor import EncoderWord
 
 COUNT = 1e-5

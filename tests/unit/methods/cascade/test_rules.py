@@ -94,10 +94,17 @@ PLANT = [
     ),
 ]
 
-ENTRIES = [*PARTS, *METHOD, *SENSORS, *PLANT]
+HOME = [
+    given("search faster than the axis", "home.speed=0.6 m/s", key="home.speed"),
+    given("creep faster than the search", "home.creep=60 mm/s", key="home.creep"),
+    given("stop inside the travel", "home.by=contact", "home.position=5 mm", key="home.position"),
+    given("switch beyond the travel", "home.position=-6 mm", key="home.position"),
+]
+
+ENTRIES = [*PARTS, *METHOD, *SENSORS, *PLANT, *HOME]
 
 
-@pytest.mark.parametrize("bad", params(parts=PARTS, method=METHOD, sensors=SENSORS, plant=PLANT))
+@pytest.mark.parametrize("bad", params(parts=PARTS, method=METHOD, sensors=SENSORS, plant=PLANT, home=HOME))
 def test_rule(bad, good_text, load_text, golden):
     check_rule(bad, good_text, load_text, golden)
 

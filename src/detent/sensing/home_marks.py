@@ -1,0 +1,58 @@
+"""What an axis has to find its reference by: a switch at one side of its way, and index marks of its encoder."""
+
+import math
+
+from detent.kernel.registers import Registers, block, f8, i8, register, u1
+from detent.kernel.step import step
+from detent.sensing.position_sensor import EncoderWord
+
+
+class HomeWires(Registers):
+    """The switch, and what the encoder has latched at its last index mark."""
+
+    switch: u1 = register("1 on the home switch")
+    marks: i8 = register("index marks passed", unit="count")
+    mark: EncoderWord = block("encoder at the last one")
+
+
+class HomeMarksParams(Registers):
+    """Where they are."""
+
+    present: u1 = register("1 where there are any")
+    side: f8 = register("side of its edge on which the switch is on, 1 or -1", unit="1")
+    edge: f8 = register("edge of the switch", unit="m")
+    mark: f8 = register("an index mark", unit="m")
+    pitch: f8 = register("way from one to the next; 0: there are none", unit="m")
+
+
+class HomeMarks(Registers):
+    """Between which marks the axis is."""
+
+    cell: i8 = register("number of the mark below it", unit="count")
+
+
+@step
+def latch(word: EncoderWord, travel: float, position: float) -> None:
+    """The nearest count of a scale at `position` [m], `travel` [m] per count; without counts the position itself."""
+    if travel == 0.0:
+        word.place = position
+    else:
+        word.count = math.floor(position / travel + 0.5)
+
+
+@step
+def sense_home(p: HomeMarksParams, r: HomeMarks, wires: HomeWires, position: float, travel: float) -> None:
+    """Switch and marks with the axis at `position` [m], whose encoder has `travel` [m] per count."""
+    wires.switch = 1 if (position - p.edge) * p.side >= 0.0 else 0
+    if p.pitch > 0.0:
+        cell = math.floor((position - p.mark) / p.pitch)
+        if cell != r.cell:
+            wires.marks += 1
+            latch(wires.mark, travel, p.mark + max(cell, r.cell) * p.pitch)
+            r.cell = cell
+
+
+def stand_home(p: HomeMarksParams, r: HomeMarks, wires: HomeWires, position: float) -> None:
+    """At power-on an axis has passed no mark."""
+    wires.switch = int(bool(p.present) and (position - p.edge) * p.side >= 0.0)
+    r.cell = math.floor((position - p.mark) / p.pitch) if p.pitch > 0.0 else 0
