@@ -30,7 +30,7 @@ def guarded(**times):
     p.guard.following, p.guard.travel = 1, 1
     for name, value in times.items():
         setattr(p.guard, name, value)
-    c.guarded = c.on = 1
+    c.guarded = c.known = c.on = 1
     return p, c
 
 
@@ -58,6 +58,14 @@ def test_an_end_is_passed_where_the_chosen_encoder_says_so(place, side, on_load)
     (c.load_sensor if on_load else c.motor_sensor).position = place
     look_after(p, c, 0)
     assert (c.event, c.guard.code, c.guard.side) == (FAULT, TRAVEL, side)
+
+
+def test_an_end_says_nothing_while_the_position_is_not_known():
+    p, c = guarded()
+    c.known = 0
+    c.motor_sensor.position = -2.0
+    look_after(p, c, 0)
+    assert (c.event, c.guard.code) == (0, 0)
 
 
 def test_the_first_fault_stays():
