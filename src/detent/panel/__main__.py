@@ -16,6 +16,8 @@ from detent.panel.gate import Here, local_names
 from detent.panel.keys import Keys
 from detent.panel.sockets import LONGEST_FRAME
 
+AT_ONCE = 1 << 14  # bytes that are read of one connection before others have their turn
+
 
 def listen(addresses: Sequence[str], port: int) -> list[socket.socket]:
     """Sockets on one port of each address; one behind the first that this machine has not is left out."""
@@ -31,6 +33,7 @@ def listen(addresses: Sequence[str], port: int) -> list[socket.socket]:
         # What is accepted inherits it; asyncio leaves it out where a socket was not made for TCP by name. Without it a
         # small message waits 40 ms for the acknowledgement of the one before it.
         one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, AT_ONCE)
         port = one.getsockname()[1]
         found.append(one)
     return found

@@ -127,6 +127,7 @@ class Sockets:
             if wrong:
                 mark = {"as": message["as"]} if "as" in message else {}
                 await socket.send_text(json.dumps(mark | {"error": wrong}))
+                await asyncio.sleep(0)  # a thousand of them may wait to be read; others have their turn between
                 continue
             if word in FREE:
                 await self._stop(socket, message)
