@@ -5,6 +5,7 @@ leaves out has the default that stands here. Importing its module must load neit
 that `detent check` stays quick: a method says where its package has them.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
@@ -113,6 +114,9 @@ class Live:
     memory: "Registers"  # what the method remembers between two looks
     tick: float  # base tick [s]
     unit: str = "m"  # of positions
+    speed: float = math.nan  # largest that may be commanded [m/s] or [rad/s]
+    view: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """What its own view on the panel shows (`panel.js` of its package): "title", and "data" that does not change."""
     feed: tuple[Any, ...] = ()  # what the host lays ready
     fault: Callable[[], str] = str  # the fault of its guard in a sentence, empty where there is none
     tray: "NDArray[np.uint8] | None" = None

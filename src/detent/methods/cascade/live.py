@@ -135,8 +135,8 @@ def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[s
 
     return {
         "": Live(
-            host.params, host.state, q, memory, host.tick, spec.unit("m"), host.feed, fault,
-            places=places(spec, host.params, host.period), limits=guard_limits(spec),
+            host.params, host.state, q, memory, host.tick, spec.unit("m"), spec.limits.speed, {"title": "Cascade loop"},
+            host.feed, fault, places=places(spec, host.params, host.period), limits=guard_limits(spec),
         )
     }  # fmt: skip
 

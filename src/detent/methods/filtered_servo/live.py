@@ -141,8 +141,8 @@ def live(spec: FilteredServoSpec, operation: Callable[..., OperationParams]) -> 
               COUNTERS + DEVIATION_RANGE: largest}  # fmt: skip
     return {
         "": Live(
-            machine.params, machine.state, q, FilteredLive(), machine.tick, fault=lambda: host.failure,
-            places=places(spec), limits=limits,
+            machine.params, machine.state, q, FilteredLive(), machine.tick, speed=speed,
+            view={"title": "Filtered speed"}, fault=lambda: host.failure, places=places(spec), limits=limits,
             fault_numbers={COUNTERS + DEVIATION_RANGE: FOLLOWING, COUNTERS + SPEED_RANGE: OVERSPEED},
         )
     }  # fmt: skip

@@ -126,9 +126,11 @@ def live(spec: PhaseServoSpec, operation: Callable[..., OperationParams]) -> dic
     machine: Any = host.machine
     machine.params.controller.guard.softly = SOFT
     memory = PhaseLive(base=begin, position=begin)
+    cycle = machine.params.controller.converters.absolute.mask + 1
     return {
         "": Live(
-            machine.params, machine.state, q, memory, machine.tick, fault=lambda: host.failure,
+            machine.params, machine.state, q, memory, machine.tick, speed=spec.limits.speed,
+            view={"title": "Phase", "data": {"cycle": int(cycle)}}, fault=lambda: host.failure,
             places=places(spec, spec.tick), limits={STUCK: spec.protection.stuck_effort, SATURATED: 1.0},
         )
     }  # fmt: skip

@@ -473,8 +473,10 @@ def live(spec: PrintHeadSpec, operation: Callable[..., OperationParams]) -> dict
     def work(job: PrintJob) -> HeadWork:
         return HeadWork(spec, made[0], job)
 
-    made.append(Live(
-            machine.params, machine.state, q, memory, machine.tick, fault=fault, tray=tray, work=work,
+    made.append(
+        Live(
+            machine.params, machine.state, q, memory, machine.tick, speed=spec.limits.speed,
+            view={"title": "Print line"}, fault=fault, tray=tray, work=work,
             places=places(), fault_numbers={OBSTRUCTED: SATURATED},
         )
     )  # fmt: skip

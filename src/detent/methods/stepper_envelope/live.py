@@ -248,8 +248,14 @@ def live_motor(spec: StepperEnvelopeSpec, name: str, operation: Callable[..., Op
         return f"motor {name}: {STEP_FAULT_TEXT[rule.cause]}" if rule.state == FAULT else ""
 
     numbers = {FAULTS + INFEASIBLE: FOLLOWING, FAULTS + OUT_OF_RANGE: END_OF_TRAVEL}
+    zones = tables.up.zones
+    data = {
+        "edges": [table.mechanics.lower_end + int(edge) * table.step for edge in zones.edges],
+        "speeds": [zones.limits[number] * table.step for number in zones.numbers],
+    }
     return Live(
-        motor.p, motor.r, q, memory, tick, feed=motor.feed, fault=fault, places=places(tick), fault_numbers=numbers
+        motor.p, motor.r, q, memory, tick, speed=table.limits.speed, view={"title": "Envelope", "data": data},
+        feed=motor.feed, fault=fault, places=places(tick), fault_numbers=numbers,
     )
 
 
