@@ -33,6 +33,7 @@ from tests.live_bench import MOVED, OPERATED, Bench
 from tests.live_course import COMPILED, COVERED, bound, hunted, under_way
 from tests.places import ROOT
 from tests.unit.planning import test_course
+from tests.live_browser import Script, panelled, run_script, until
 
 import detent
 from detent.control import operation as ops
@@ -1676,3 +1677,133 @@ def test_39_minutes_without_a_fault(name):
 def test_39_an_hour_without_a_fault(name):
     faults, motions = false_alarms(name, 3600.0)
     assert (faults, motions > 300) == (0, True)
+# ---- the panel, in a real browser
+
+LEASE = 0.2  # of a jog [s]
+WAYS = (
+    "mouse up", "touch end", "key up", "blur", "hidden tab", "page closed", "context menu", "network cut",
+    "a second of lag", "server killed",
+)  # fmt: skip
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_40_page_is_quick_and_leaves_the_loop_alone(tmp_path: Path) -> None:
+    """First values within 2 s, 20 screens a second with eight channels of 1 kHz; the loop misses no more by it."""
+    with panelled(tmp_path) as live, live.connect() as axis:
+        before = axis.status["loop"]
+        time.sleep(5.0)
+        alone = axis.status["loop"]
+        found = run_script("speed", live.link(), "5")
+    missed = (alone["skipped"] - before["skipped"]) / (alone["periods"] - before["periods"])
+    assert found["first"] < 2.0
+    assert 20.0 <= found["screens"] <= 30.0
+    assert found["channels"] == 8
+    assert found["rows"] == pytest.approx(1000.0, rel=0.05)
+    assert found["skipped"] / found["periods"] <= 1.5 * missed + 0.005
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_41_a_jog_ends_however_it_is_let_go(tmp_path: Path) -> None:
+    """At rest within lease and ramp in ten ways of ten, and it does not begin again; the page says over which way."""
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live, live.connect() as axis, Script("jog") as page:
+        for way in WAYS:
+            page.tell("hold", way, "plus" if axis.position < 0.25 else "minus", live.link())
+            let_go = axis.status
+            if way == "server killed":
+                live.kill_panel()
+            page.tell("release")
+            rests = until(axis, lambda s: s["rests"] and s["running"] is None)
+            speed, ramp = 0.1, rests["last_stop"]
+            assert 0.0 < ramp < 0.01, way
+            assert abs(rests["position"] - let_go["position"]) < speed * (LEASE + 0.5) + ramp, way
+            time.sleep(0.5)
+            assert axis.status["position"] == pytest.approx(rests["position"], abs=1e-4), way
+            told = page.tell("look")
+            is_told = way not in {"page closed", "network cut", "server killed"}  # it hears of no stop, or is gone
+            assert told["told"].startswith("Stopped over") or not is_told, way
+            assert not told["pressed"], way
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Every view as a browser has found it on a screen of 360 px."""
+    with panelled(tmp_path_factory.mktemp("views"), "cascade.toml", "--period", "10 ms") as live:
+        found = run_script("views", live.link())
+    assert len(found["views"]) >= 11
+    return found
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_42_stop_is_on_every_screen(tmp_path: Path, views: dict[str, Any]) -> None:
+    """By a form where there are no scripts, by Esc on each view, on 360 px without scrolling."""
+    for name, seen in views["views"].items():
+        stop = seen["stop"]
+        assert 0 <= stop["top"] < stop["bottom"] <= stop["screen"], name
+        assert (seen["escape"], stop["isOnTop"], stop["height"] >= 64) == (True, True, True), name
+        assert stop["wide"] <= 360, f"{name} scrolls sideways"
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live, live.connect() as axis:
+        epoch = axis.status["epoch"]
+        plain = run_script("noscript", live.link("viewer"))
+        assert axis.status["epoch"] > epoch
+    assert plain["band"].startswith("SIMULATION")
+    assert (plain["at"], plain["stop"]["bottom"] <= 640) == ("/", True)
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_43_every_view_is_sound(views: dict[str, Any]) -> None:
+    """No error, no request to another host, nothing serious for axe-core; the keyboard reaches all that can be used."""
+    assert (views["problems"], views["strangers"]) == ([], [])
+    for name, seen in views["views"].items():
+        assert (name, seen["serious"], seen["unreached"]) == (name, [], [])
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_44_an_hour_of_telemetry_leaves_the_heap_as_it_is(tmp_path: Path) -> None:
+    """An hour of status and of rows at 1 kHz, handed to the scope as fast as it takes them."""
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live:
+        found = run_script("heap", live.link())
+    assert found["problems"] == []
+    assert found["rows"] > 3_600_000
+    assert found["seconds"] < 3600 / 20
+    assert found["after"] < 1.1 * found["before"]
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_45_two_browsers_see_who_commands_and_either_stops(tmp_path: Path) -> None:
+    """The second is refused, a viewer stops, and taking over ends the jog of the first."""
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live:
+        found = run_script("two", live.link(), live.link(), live.link("viewer"))
+    assert found["problems"] == []
+    assert found["mine"].startswith("you command")
+    assert "engineer" in found["theirs"]
+    assert not found["theirs"].startswith("you")
+    assert (found["refused"]["how"], found["refused"]["code"]) == ("refused", ops.SECOND)
+    assert "operator" in found["viewerMoves"]
+    assert found["stoppedByViewer"] is None
+    assert found["afterTaking"]["theirs"].startswith("you command")
+    assert not found["afterTaking"]["mine"].startswith("you")
+    assert found["afterTaking"]["pressed"] == 0
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_47_scope_shows_the_edge_at_its_trigger(tmp_path: Path) -> None:
+    """Half of the record lies before the edge, which is there within a sample; the file holds what the ring does."""
+    with panelled(tmp_path, "cascade.toml", "--period", "5 ms") as live:
+        found = run_script("scope", live.link())
+    assert found["problems"] == []
+    rows, ring = np.array(found["rows"]), np.array(found["ring"])
+    velocity, level = rows[:, 2 + found["channels"].index("velocity")], 5e-3
+    trigger = int(np.flatnonzero(rows[:, 1] == 0.0)[0])
+    assert trigger == len(rows) // 2
+    assert velocity[trigger - 1] < level <= velocity[trigger]
+    assert (velocity[:trigger] < level).all()
+    np.testing.assert_array_equal(rows[:, 0], ring[:, 0])
+    np.testing.assert_array_equal(rows[:, 2:].astype(np.float32), ring[:, 1:].astype(np.float32))
+    assert "1/Δt" in found["cursors"]

@@ -131,6 +131,7 @@ class Host:
         stated: bool = True, memory: mmap | None = None,
     ) -> None:  # fmt: skip
         make = operation_params(careful=int(careful))
+        self.method = method.name
         self.axis: Live = method.live(spec, make, motor)
         self.board: Any = Board() if memory is None else Board.from_buffer(memory)
         loop = self.board.loop

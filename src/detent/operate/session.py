@@ -53,6 +53,7 @@ class Session:
         return self.about | {
             "unit": self.unit, "period": period, "commands": words, "limits": limits, "channels": channels,
             "injections": can_inject,
+            "method": self.host.method, "max_speed": self.host.axis.speed, "view": dict(self.host.axis.view),
         }  # fmt: skip
 
     def status(self) -> dict[str, Any]:

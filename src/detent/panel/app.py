@@ -5,6 +5,7 @@ import io
 from base64 import b64decode
 from collections.abc import AsyncGenerator, Iterable, Sequence
 from contextlib import asynccontextmanager
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from detent.errors import DetentError
+from detent.methods.registry import METHODS
 from detent.panel.gate import Gate, Here, Rule, person, place_of
 from detent.panel.keys import COOKIE, LIFETIMES, LINK, TICKET, Keys
 from detent.panel.line import Line
@@ -31,6 +33,7 @@ RULES = {
     "/": Rule("viewer"),
     "/enter": Rule(""),
     "/stop": Rule("viewer", stops=True),
+    "/static/method.js": Rule("viewer"),
     "/static": Rule("viewer"),
     "/ws": Rule("viewer"),
     "/api/ticket": Rule("viewer", changes=True),
@@ -62,6 +65,7 @@ class Panel:
             Route("/", self.page),
             Route("/enter", self.enter),
             Route("/stop", self.stop, methods=["POST"]),
+            Route("/static/method.js", self.method_view),
             Mount("/static", StaticFiles(directory=HERE / "static", packages=[("detent.page", "vendor")])),
             WebSocketRoute("/ws", self.attend),
             Route("/api/ticket", self.ticket, methods=["POST"]),
@@ -143,6 +147,14 @@ class Panel:
         found: list[dict[str, Any]] = await self._ask(do="positions")
         names = list(dict.fromkeys(name for row in found for name in row))
         return _table(names, ([row.get(name, "") for name in names] for row in found))
+
+    async def method_view(self, _request: Request) -> Response:
+        """What the method's package brings for its own view."""
+        package = type(METHODS[self.about["method"]]).__module__.rpartition(".")[0]
+        script = files(package).joinpath("panel.js")
+        if not script.is_file():
+            return PlainTextResponse(f"{package} brings no view of its own\n", 404)
+        return Response(script.read_bytes(), media_type="text/javascript")
 
     async def scope(self, request: Request) -> Response:
         """Rows of the ring as a table: ?channels=position,velocity&first=0."""
