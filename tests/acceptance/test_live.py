@@ -58,6 +58,9 @@ from detent.operate.faults import injection_of
 from detent.operate.host import Ending, Host, repeat
 from detent.operate.session import Session
 from detent.planning import course
+from detent.operate.host import Ending, repeat
+from detent.operate.session import Session
+from detent.operate.words import why_not_moving
 from detent.planning.course import advance as advance_course
 from detent.plant.injection import BLOCKED
 
@@ -1807,3 +1810,56 @@ def test_47_scope_shows_the_edge_at_its_trigger(tmp_path: Path) -> None:
     np.testing.assert_array_equal(rows[:, 0], ring[:, 0])
     np.testing.assert_array_equal(rows[:, 2:].astype(np.float32), ring[:, 1:].astype(np.float32))
     assert "1/Δt" in found["cursors"]
+
+
+@pytest.mark.compiled
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time")
+def test_48_why_not_moving_names_what_is_not_met() -> None:
+    """Sixteen situations, each made at the axis: its reason and its remedy, and those alone."""
+    host = Bench("cascade").host
+    session, o = Session(host, {}), host.board.operation
+
+    def why(client: int = 1) -> list[tuple[str, str]]:
+        return why_not_moving(session.status(), client)
+
+    def ask(word: str, value: object = None) -> None:
+        session.wait(session.ask(word, value))
+
+    def is_told(what: str, remedy: str, *others: str, client: int = 1) -> None:
+        told = why(client)
+        assert any(what in one and remedy in do for one, do in told), told
+        assert len(told) == 1 + len(others), told
+        assert all(any(other in one for one, _ in told) for other in others), told
+
+    is_told("not ready", "wait")
+    host.run_until_ready()
+    is_told("no torque: switch on disabled", "enable")
+    ask("order", 0)
+    is_told("no torque: ready to switch on", "enable")
+    ask("order", 1)
+    is_told("no torque: switched on", "enable")
+    ask("enable")
+    is_told("tenth of the speed", "confirm")
+    ask("confirm")
+    is_told("nothing has been asked", "jog")
+    ask("move_to", "0 mm")
+    is_told("lower limit", "other side")
+    is_told("somebody else commands", "take", "lower limit", client=2)
+    ask("move_to", "500 mm")
+    is_told("upper limit", "other side")
+    ask("move_to", "250 mm")
+    o.answer.near = 0
+    is_told("not in its window", "wait")
+    o.answer.near, o.answer.limited = 1, 1
+    is_told("at its limit", "holds")
+    o.answer.limited = 0
+    o.trust = ops.NOT_KNOWN
+    is_told("not known", session.find_position())
+    o.trust = ops.REFERENCED
+    ask("order", 5)
+    is_told("quick stop", "enable")
+    ask("enable")
+    o.state, o.fault = STATE_NAMES.index("fault reaction active"), FOLLOWING
+    is_told(f"fault {FOLLOWING}", "come to rest")
+    o.state = STATE_NAMES.index("fault")
+    is_told(f"fault {FOLLOWING}", "reset")

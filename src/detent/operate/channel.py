@@ -233,8 +233,8 @@ class Channel:
         status = self.session.status()
         holder = self._clients.get(status["client"])
         return {
-            "status": status, "why": why_not_moving(status), "clients": len(self._clients), "you": client.number,
-            "holder": status["client"], "holder_name": holder.who if holder else "",
+            "status": status, "why": why_not_moving(status, client.number), "clients": len(self._clients),
+            "you": client.number, "holder": status["client"], "holder_name": holder.who if holder else "",
         }  # fmt: skip
 
     async def _tell_endings(self, client: Client) -> None:

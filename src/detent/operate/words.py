@@ -1,6 +1,7 @@
 """Commands in words: what a person, a program or a page says, and what it is told."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
@@ -138,39 +139,67 @@ def status_of(host: Any, fault: str) -> dict[str, Any]:
     return {
         "state": STATE_NAMES[o.state], "position": a.position, "velocity": a.velocity, "commanded": a.commanded,
         "error": a.error, "effort": a.effort, "limited": bool(a.limited), "rests": bool(a.rests),
-        "in_window": bool(a.near), "ready": bool(a.ready), "trust": TRUSTS[o.trust], "confirmed": bool(o.confirmed),
+        "at_end": _end_of(host.axis.live.operation, o), "in_window": bool(a.near),
+        "ready": bool(a.ready), "trust": TRUSTS[o.trust], "confirmed": bool(o.confirmed),
         "fault": {"code": int(o.fault), "text": fault or REFUSAL_TEXT.get(o.fault, "")} if o.fault else None,
         "running": {"id": int(o.running), "command": kind} if o.running else None, "epoch": int(o.epoch),
         "client": int(o.client), "last_stop": o.last_stop,
         "loop": {
             "periods": int(loop.periods), "skipped": int(loop.skipped), "overruns": int(loop.overruns),
+            "ended": host.is_running and not host.is_alive,
             "worst": loop.worst * 1e-9, "mean_work": loop.work * 1e-9 / max(loop.periods, 1),
             "longest_work": loop.longest * 1e-9, "late": [int(n) for n in loop.late],
         },
     }  # fmt: skip
 
 
-def why_not_moving(status: dict[str, Any]) -> list[tuple[str, str]]:
-    """Every condition of a motion that is not met, each with what to do."""
-    found: list[tuple[str, str]] = []
-    state, fault = status["state"], status["fault"]
-    if fault:
-        found.append((f"fault {fault['code']}: {fault['text']}", "mend its cause, then reset"))
-    if not status["ready"]:
-        found.append(("the axis is not ready yet", "wait; after power-on it takes its first position"))
-    if state == "quick stop active":
-        found.append(("a quick stop holds it", "enable"))
-    elif state != "operation enabled" and not fault:
-        found.append((f"no torque: {state}", "enable"))
+def why_not_moving(status: dict[str, Any], client: int = 0) -> list[tuple[str, str]]:
+    """Every condition of a motion that is not met, each with what to do; `client` is who asks, 0 anybody."""
+    found = [*_why_no_torque(status)]
+    enabled = status["state"] == "operation enabled"
+    if client and status["client"] not in (0, client):
+        found.append(("somebody else commands", "take over, which stops a motion of theirs, or let them finish"))
     if status["trust"] == "unknown":
         found.append(("the position is not known: it creeps, and goes to no position", status["find"]))
     if status["store"] and status["store"]["trouble"]:
         found.append((f"what survives cannot be kept: {status['store']['trouble']}", "give its disk room, then enable"))
-    if state == "operation enabled" and not status["confirmed"]:
+    if enabled and not status["confirmed"]:
         found.append(("the first motion is held to a tenth of the speed", "look at it, then confirm"))
+    if status["at_end"]:
+        found.append((f"it stands at its {status['at_end']} limit", "move to the other side"))
     if status["limited"]:
         found.append(("the command is at its limit", "look for what holds the axis"))
+    if enabled and status["rests"] and not status["in_window"]:
+        found.append(("it is not in its window", "wait; where that lasts, look for what holds the axis, or stop"))
+    if not found and status["running"] is None and status["rests"]:
+        found.append(("nothing has been asked of it", "jog, or move to a position"))
     return found
+
+
+def _why_no_torque(status: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """What keeps the axis from holding and moving at all."""
+    state, fault = status["state"], status["fault"]
+    if status["loop"]["ended"]:
+        yield "the loop has ended", "start it again with: detent live FILE"
+    if fault and state == "fault reaction active":
+        yield f"fault {fault['code']}: {fault['text']}", "wait until it has come to rest"
+    elif fault:
+        yield f"fault {fault['code']}: {fault['text']}", "mend its cause, then reset"
+    if not status["ready"]:
+        yield "the axis is not ready yet", "wait; after power-on it takes its first position"
+    elif state == "quick stop active":
+        yield "a quick stop holds it", "enable"
+    elif state != "operation enabled" and not fault:
+        yield f"no torque: {state}", "enable"
+
+
+def _end_of(q: Any, o: Any) -> str:
+    """Soft limit that the commanded point stands at: lower, upper, or none of them."""
+    if q.endless or not o.answer.ready or o.trust == ops.NOT_KNOWN:
+        return ""
+    lowest, highest = ops.lower_end(q, o), ops.upper_end(q, o)
+    near = 1e-6 * (highest - lowest)
+    return "lower" if o.answer.commanded <= lowest + near else "upper" if o.answer.commanded >= highest - near else ""
 
 
 def describe_status(status: dict[str, Any], unit: str) -> str:

@@ -148,7 +148,7 @@ def test_the_words_of_the_api_block_and_can_be_awaited(folder: Path) -> None:
         axis.enable()
         assert axis.why_not_moving[0][1] == "look at it, then confirm"
         axis.confirm()
-        assert axis.why_not_moving == []
+        assert axis.why_not_moving == [("nothing has been asked of it", "jog, or move to a position")]
         at = axis.position
 
         async def there_and_back() -> None:

@@ -10,10 +10,10 @@ const NAMES = ["reference.position", "reference.velocity", "law.position_error",
 const BOXES = [ // x, y, what it is, the wire that leaves it
   [10, 20, "reference", "reference.position"], [150, 20, "position error", "law.position_error"],
   [290, 20, "velocity error", "law.velocity_error"], [430, 20, "command", "law.command"],
-  [150, 130, "reference velocity", "reference.velocity"], [290, 130, "integral part", "law.integral"],
+  [150, 130, "velocity wanted", "reference.velocity"], [290, 130, "integral part", "law.integral"],
   [430, 130, "feedforward", "law.feed_forward"],
 ];
-const WIRES = ["M130 50H150", "M270 50H290", "M410 50H430", "M210 130V110M350 130V110M490 130V110", "M560 50H575V230H70V80"];
+const WIRES = ["M130 50H150", "M270 50H290", "M410 50H430", "M210 130V80M350 130V80M490 130V80", "M550 50H575V230H70V80"];
 
 export function open(root, { link }) {
   const { unit, channels } = link.about;

@@ -63,7 +63,7 @@ function wireStop() {
 
 /** The reasons why it does not move, each with its remedy, as a button where that is a command. */
 function showReasons(why, running) {
-  const told = JSON.stringify([why, running]);
+  const told = JSON.stringify([why, running, name]);
   if (showReasons.last === told) return;
   showReasons.last = told;
   const offered = link.about.commands;
@@ -72,7 +72,7 @@ function showReasons(why, running) {
     const button = word && h("button", { class: "small", onclick: () => act(word, word === "trust" ? 2 : undefined) }, LABELS[word]);
     return h("li", {}, h("span", {}, `${what}: `, h("b", {}, remedy)), button);
   }));
-  $("why-box").hidden = why.length === 0;
+  $("why-box").hidden = why.length === 0 || (name !== "status" && why.every(([what]) => what.startsWith("nothing")));
 }
 
 function showStatus() {

@@ -10,7 +10,7 @@ export function open(root, { link }) {
   ask("/api/axis").then((axis) => {
     text.textContent = axis.text;
     fill(effective, h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of values in effect" },
-      h("table", {}, h("thead", {}, h("tr", {}, ["Key", "Value", "From", "Meaning"].map((one) => h("th", { scope: "col" }, one)))),
+      h("table", { class: "prose" }, h("thead", {}, h("tr", {}, ["Key", "Value", "From", "Meaning"].map((one) => h("th", { scope: "col" }, one)))),
         h("tbody", {}, axis.effective.map(([key, ...cells]) => h("tr", {}, h("th", { scope: "row" }, key), cells.map((one) => h("td", {}, String(one)))))))));
   }).catch((error) => fill(effective, h("p", {}, `The file cannot be shown: ${error.message}`)));
   return {};

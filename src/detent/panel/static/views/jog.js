@@ -22,9 +22,9 @@ export function open(root, { link, act, tell }) {
   const velocity = (sign, scale = 1) => sign * Math.min((fastest * speed.value * scale) / 100, fastest);
   const show = () => say(said, quantity(velocity(1), per));
   speed.addEventListener("input", show);
-  const minus = hold.button(h("button", { class: "jog", id: "jog-minus" }, h("span", { "aria-hidden": true }, "◀ "), "Hold: minus"),
+  const minus = hold.button(h("button", { class: "jog", id: "jog-minus" }, h("span", { "aria-hidden": true }, "◀\u00a0"), "Hold: minus"),
     () => velocity(-1));
-  const plus = hold.button(h("button", { class: "jog", id: "jog-plus" }, "Hold: plus", h("span", { "aria-hidden": true }, " ▶")),
+  const plus = hold.button(h("button", { class: "jog", id: "jog-plus" }, "Hold: plus", h("span", { "aria-hidden": true }, "\u00a0▶")),
     () => velocity(1));
   const pad = h("div", { class: "pad", tabindex: 0, id: "jog-pad", role: "group", "aria-label": "Jog pad: arrow keys move the axis while it has the focus" },
     minus, plus);
