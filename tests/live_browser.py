@@ -22,6 +22,7 @@ from detent.panel.keys import keys_of, link_of
 
 SCRIPTS = Path(__file__).parent / "browser"
 PATIENCE = 180.0  # of a script [s]
+NODE = 20  # oldest release that the driver takes
 
 
 def chromium() -> str:
@@ -29,8 +30,10 @@ def chromium() -> str:
     found = os.environ.get("CHROMIUM") or shutil.which("chromium")
     if found is None:
         pytest.skip("no chromium here; a browser test needs Debian's package chromium, or CHROMIUM=path")
-    if shutil.which("node") is None or not (SCRIPTS / "node_modules" / "playwright-core").is_dir():
-        pytest.skip("no playwright-core here; a browser test needs node 20 and: npm ci --prefix tests/browser")
+    node = shutil.which("node")
+    version = subprocess.run([node, "--version"], capture_output=True, text=True, check=True).stdout if node else "v0"
+    if int(version[1:].partition(".")[0]) < NODE or not (SCRIPTS / "node_modules" / "playwright-core").is_dir():
+        pytest.skip(f"no playwright-core here; a browser test needs node {NODE} and: npm ci --prefix tests/browser")
     return found
 
 

@@ -30,10 +30,10 @@ from tests.course_rig import excursions, follow, shortest_stop, turns
 from tests.difference import diff
 from tests.live_axes import PAGES, PLAIN, Head, Stepper, longest_stop, moves
 from tests.live_bench import MOVED, OPERATED, Bench
+from tests.live_browser import Script, panelled, run_script, until
 from tests.live_course import COMPILED, COVERED, bound, hunted, under_way
 from tests.places import ROOT
 from tests.unit.planning import test_course
-from tests.live_browser import Script, panelled, run_script, until
 
 import detent
 from detent.control import operation as ops
@@ -61,6 +61,7 @@ from detent.planning import course
 from detent.operate.host import Ending, repeat
 from detent.operate.session import Session
 from detent.operate.words import why_not_moving
+from detent.planning import course
 from detent.planning.course import advance as advance_course
 from detent.plant.injection import BLOCKED
 
@@ -1815,7 +1816,7 @@ def test_47_scope_shows_the_edge_at_its_trigger(tmp_path: Path) -> None:
 @pytest.mark.compiled
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time")
 def test_48_why_not_moving_names_what_is_not_met() -> None:
-    """Sixteen situations, each made at the axis: its reason and its remedy, and those alone."""
+    """Fifteen situations, each made at the axis: its reason and its remedy, and those alone."""
     host = Bench("cascade").host
     session, o = Session(host, {}), host.board.operation
 
@@ -1863,3 +1864,23 @@ def test_48_why_not_moving_names_what_is_not_met() -> None:
     is_told(f"fault {FOLLOWING}", "come to rest")
     o.state = STATE_NAMES.index("fault")
     is_told(f"fault {FOLLOWING}", "reset")
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_46_positions_are_taught_typed_and_taken_back(tmp_path: Path) -> None:
+    """Teach two, go to the first, type one in mm and in inches, undo, save; what is no place changes nothing."""
+    with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live:
+        found = run_script("positions", live.link())
+    assert found["problems"] == []
+    assert found["taught"] == "teach: done"
+    assert found["right"] == pytest.approx(found["begin"] * 1e3 + 30.0, abs=0.1)
+    assert found["edited"] == ["edit: done", pytest.approx(35.0, abs=1e-3)]
+    assert found["inches"] == ["edit: done", pytest.approx(50.8, abs=1e-3)]
+    assert "parsec" in found["wrong"][0]
+    assert found["undone"] == pytest.approx(35.0, abs=1e-3)
+    names = [line.split(",") for line in found["file"].splitlines()]
+    assert {"left", "right"} < {cell for line in names for cell in line}
+    assert found["job"] == "Job done: 4 moves, every one inside its window."
+    assert found["jobAt"] == pytest.approx(0.035, abs=1e-4)
+    assert "move 2 (9 m), refused" in found["badJob"]

@@ -172,7 +172,9 @@ def _table(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> Response:
     text = io.StringIO()
     writer = csv.writer(text)
     writer.writerow(names)
-    writer.writerows([f"'{c}" if isinstance(c, str) and c[:1] in "=+-@\t" else c for c in row] for row in rows)
+    writer.writerows(
+        [f"'{c}" if isinstance(c, str) and c.startswith(tuple("=+-@\t")) else c for c in row] for row in rows
+    )
     return Response(text.getvalue(), media_type="text/csv")
 
 

@@ -29,6 +29,7 @@ function tell(text, level = "") {
 
 /** Ask for a command and tell how it ended; gives the ending, or null where it was not taken. */
 async function act(word, value, speed) {
+  tell(`${word.replace("_", " ")}: under way`);
   try {
     const { ended } = await link.command(word, value, speed);
     const how = await ended;

@@ -20,7 +20,7 @@ function record(one) {
 export function open(root, { link, act, tell }) {
   const now = h("div", { role: "status" });
   const past = h("div", { id: "faults" });
-  const injections = link.about.injections ?? [];
+  const injections = Object.entries(link.about.injections ?? {}).flatMap(([where, kinds]) => kinds.map((kind) => `${where} ${kind}`));
   let code = -1;
   let isOpen = true;
   async function load() {
@@ -35,8 +35,10 @@ export function open(root, { link, act, tell }) {
   root.append(h("h1", {}, "Faults"), now);
   if (injections.length) {
     const what = choice(injections.map((one) => [one, one]), injections[0], { id: "inject-what" });
-    root.append(h("section", {}, h("h2", {}, "Practise: inject a fault into the simulated axis"), field("Fault", what),
-      h("p", { class: "line" }, h("button", { id: "inject", class: "plain", onclick: () => act("inject", what.value) }, "Inject"),
+    const amount = h("input", { type: "text", id: "inject-amount", autocomplete: "off", placeholder: "as it comes" });
+    root.append(h("section", {}, h("h2", {}, "Practise: inject a fault into the simulated axis"), 
+      h("div", { class: "fields" }, field("Fault", what), field("How much, as 1 mm or 30 N; may be empty", amount)),
+      h("p", { class: "line" }, h("button", { id: "inject", class: "plain", onclick: () => act("inject", `${what.value} ${amount.value}`.trim()) }, "Inject"),
         h("button", { id: "mend", class: "plain", onclick: () => act("inject", "nothing") }, "Mend it"))));
   }
   root.append(h("h2", {}, "History"), past);

@@ -1,16 +1,15 @@
 // Jog: hold to move, steps, a target. Keys move the axis only while the pad has the focus, and it shows that.
 
-import { choice, field, h, say } from "../dom.js";
+import { field, h, say } from "../dom.js";
 import { Hold } from "../hold.js";
-import { number, quantity, shown, typed } from "../units.js";
-
-const STEPS = { m: [1e-5, 1e-4, 1e-3, 1e-2], rad: [0.01, 0.1, 1, 10].map((one) => (one * Math.PI) / 180) };
+import { quantity, shown, typed } from "../units.js";
+import { steps } from "./steps.js";
 
 const HINT = "It moves while you hold. Letting go, leaving the page or losing the connection stops it. "
   + "Keys, with the pad in focus: ← → hold, Shift fast, Ctrl fine.";
 
 export function open(root, { link, act, tell }) {
-  const { unit, limits, commands, max_speed: fastest } = link.about;
+  const { unit, commands, max_speed: fastest } = link.about;
   const per = `${unit}/s`;
   const hold = new Hold(link, (why) => {
     tell(`Jog ended: ${why}.`);
@@ -37,38 +36,27 @@ export function open(root, { link, act, tell }) {
   pad.addEventListener("keyup", () => hold.end("released"));
   pad.addEventListener("focusout", (event) => { if (!pad.contains(event.relatedTarget)) hold.end("the pad lost the focus"); });
 
-  const size = choice((STEPS[unit] ?? STEPS.m).map((one) => [one, quantity(one, unit)]), (STEPS[unit] ?? STEPS.m)[2], { id: "step-size" });
-  const step = (sign) => act("move_by", sign * Number(size.value), Math.max(speed.value / 100, 0.01));
+  const step = commands.includes("move_by") ? steps({ link, act }, () => speed.value / 100) : null;
   const target = h("input", { type: "text", inputmode: "decimal", id: "move-target", placeholder: `5 ${shown(unit).name}`, autocomplete: "off" });
-  const ghost = h("p", { class: "hint", id: "ghost" });
   const stopped = h("p", { class: "hint", id: "last-stop" });
   const move = h("form", { class: "line" }, field(`Target (${shown(unit).name}, or with a unit: 0.2 in)`, target), h("button", {}, "Move to"));
   move.addEventListener("submit", (event) => {
     event.preventDefault();
     act("move_to", typed(target.value, unit), speed.value / 100);
   });
-  const canStep = commands.includes("move_by");
   root.append(h("h1", {}, "Jog"), ...(commands.includes("jog") ? [pad, h("p", { class: "hint" }, HINT)] : [h("p", {}, "This axis has no jog.")]));
   root.append(
     h("div", { class: "field" }, h("label", { for: "jog-speed" }, "Speed"), speed, said), stopped,
-    canStep ? h("section", {}, h("h2", {}, "By a step"), field("Step", size),
-      h("div", { class: "line" }, h("button", { id: "step-minus", onclick: () => step(-1) }, "− step"),
-        h("button", { id: "step-plus", onclick: () => step(1) }, "+ step")), ghost) : "",
+    step ? h("section", {}, h("h2", {}, "By a step"), step.root) : "",
     commands.includes("move_to") ? h("section", {}, h("h2", {}, "To a position"), move) : "",
   );
   show();
   return {
     status(s) {
       if (s.last_stop && ended) say(stopped, `Stopped over ${quantity(s.last_stop, unit)}: ${ended}.`);
-      if (!canStep) return;
-      const [to, from] = [s.commanded + Number(size.value), s.commanded - Number(size.value)];
-      const beyond = limits && (to > limits[1] || from < limits[0]) ? "; one of them lies beyond the limits" : "";
-      say(ghost, `− will move to ${number(from, unit)}, + to ${quantity(to, unit)}${beyond}`);
+      step?.status(s);
     },
-    key(event) {
-      const k = { "[": -1, "]": 1 }[event.key];
-      if (k) size.selectedIndex = Math.min(Math.max(size.selectedIndex + k, 0), size.length - 1);
-    },
+    key(event) { step?.key(event); },
     close() { hold.close(); },
   };
 }

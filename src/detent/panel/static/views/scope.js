@@ -5,12 +5,13 @@ import { fill, h, mark, save, say } from "../dom.js";
 import { Plot } from "../plot.js";
 import { quantity, shown, typed } from "../units.js";
 import { cursors } from "./cursors.js";
+import { steps } from "./steps.js";
 import { controls, parse } from "./scope_controls.js";
 
 const FIRST = ["position", "commanded", "velocity", "error"]; // what is shown to whoever opens it first
 const kept = { channels: null }; // between two visits of the view
 
-export function open(root, { link, tell }) {
+export function open(root, { link, act, tell }) {
   const all = link.about.channels;
   const { period } = link.about;
   kept.channels ??= FIRST.filter((one) => all.some(({ name }) => name === one));
@@ -18,6 +19,7 @@ export function open(root, { link, tell }) {
   const ui = controls(all, kept.channels);
   const plot = new Plot(h("div", { class: "plot", id: "plot", tabindex: 0, role: "img", "aria-label": "Scope; its values are in the table below" }));
   const reading = cursors(plot);
+  const step = link.about.commands.includes("move_by") ? steps({ link, act }, () => 1) : null;
   let channels = [];
   let rows = null;
   let capture = null; // that is awaited
@@ -135,12 +137,16 @@ export function open(root, { link, tell }) {
     frame ||= requestAnimationFrame(draw);
   };
   link.addEventListener("rows", onRows);
-  root.append(h("h1", {}, "Scope"), said, plot.root, reading.root, ui.root);
+  root.append(h("h1", {}, "Scope"), said, plot.root, ui.buttons, step?.root ?? "", reading.root, ui.root);
   watch();
   return {
     get record() { return record; },
     get rows() { return rows; },
-    key(event) { if (event.key === "s" || event.key === "S") single(); },
+    status(s) { step?.status(s); },
+    key(event) {
+      if (event.key === "s" || event.key === "S") single();
+      else step?.key(event);
+    },
     close() {
       link.removeEventListener("rows", onRows);
       link.watch([]).catch(() => {});

@@ -47,12 +47,11 @@ export function controls(all, chosen) {
   const button = (id, text) => h("button", { id, type: "button", class: "plain" }, text);
   const [run, arm, overlay, csv] = [button("scope-run", "Freeze"), button("scope-arm", "Single"), button("scope-overlay", "Keep as overlay"), button("scope-csv", "CSV")];
   const root = h("div", { class: "scope-controls" },
-    h("div", { class: "line" }, run, arm, overlay, csv),
     h("div", { class: "fields" }, field("Time", seconds), field("Trigger", kind), field("Channel", source), field("Slope or side", rising), field("Level", level),
       field("Before the trigger", before), h("label", { class: "box" }, single, " one record, then freeze")),
     h("details", { open: true }, h("summary", {}, `Channels, ${MOST} at most`), field("Find a register of the axis", find), boxes));
   return {
-    root, run, arm, overlay, csv, single, chosen: () => [...names],
+    root, buttons: h("div", { class: "line" }, run, arm, overlay, csv), run, arm, overlay, csv, single, chosen: () => [...names],
     isSingle: () => single.checked,
     seconds: () => Number(seconds.value),
     before: () => Number(before.value),
