@@ -1763,6 +1763,10 @@ def test_43_every_view_is_sound(views: dict[str, Any]) -> None:
     assert (views["problems"], views["strangers"]) == ([], [])
     for name, seen in views["views"].items():
         assert (name, seen["serious"], seen["unreached"]) == (name, [], [])
+    fault = views["fault"]
+    assert (fault["offered"], fault["asked"]) == (["encoder stuck", "encoder off"], ["inject", "encoder stuck 1 mm"])
+    for told in ("stands still", "position was lost", "1.200 mm", "1.000 mm", "cable", "home", "F02"):
+        assert told in fault["text"], told
 
 
 @pytest.mark.wide

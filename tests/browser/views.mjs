@@ -52,5 +52,24 @@ for (const name of VIEWS) {
     unreached: await unreached(), stop, escape: true,
   };
 }
-console.log(JSON.stringify({ views: found, problems: page.problems, strangers: page.strangers }));
+
+// a record of a fault as the axis tells it, and faults to practise with
+await page.evaluate(() => {
+  const { link } = window.panel;
+  const request = link.request.bind(link);
+  const record = { number: 1, code: "F02", text: "the encoder stands still while the drive pushes", value: 0.0012, limit: 0.001, unit: "m",
+    position: "lost", causes: ["the encoder's cable", "a load that is blocked"], steps: ["look at the cable", "reset", "home"], allowed: ["reset", "home"] };
+  link.about.injections = { encoder: ["stuck", "off"] };
+  link.about.questions = [...link.about.questions, "faults"];
+  link.request = (message) => (message.do === "faults" ? Promise.resolve({ faults: [record] }) : request(message));
+  link.command = (word, value) => { window.asked = [word, value]; return Promise.reject(new Error("only looked at")); };
+});
+await view(page, "status");
+await view(page, "faults");
+await page.locator(".fault").waitFor();
+const fault = { text: await page.locator(".fault").innerText(), offered: await page.locator("#inject-what option").allInnerTexts() };
+await page.fill("#inject-amount", "1 mm");
+await page.click("#inject");
+fault.asked = await page.evaluate(() => window.asked);
+console.log(JSON.stringify({ fault, views: found, problems: page.problems, strangers: page.strangers }));
 await chromium.close();
