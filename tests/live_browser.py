@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -80,7 +80,7 @@ class Panelled:
 
 
 @contextmanager
-def panelled(folder: Path, example: str = "cascade.toml", *options: str) -> Iterator[Panelled]:
+def panelled(folder: Path, example: str = "cascade.toml", *options: str) -> Generator[Panelled]:
     """An example, live with its panel; it must end well."""
     chromium()
     file = folder / example

@@ -14,13 +14,13 @@ export function open(root, { link }) {
   const hand = h("g", {}, h("line", { x1: 150, y1: 150, x2: 150, y2: 40, class: "now" }), h("circle", { cx: 150, cy: 40, r: 7, class: "dot" }));
   const wanted = h("line", { x1: 150, y1: 150, x2: 150, y2: 24, class: "ref" });
   const marks = Array.from({ length: 36 }, (_, k) => h("line", { x1: 150, y1: 20, x2: 150, y2: k % 9 ? 28 : 38, class: "faint", transform: `rotate(${k * 10} 150 150)` }));
-  const names = [["0", 150, 16], ["90", 290, 155], ["180", 150, 298], ["270", 12, 155]].map(([text, x, y]) => h("text", { x, y, "text-anchor": "middle" }, text));
+  const names = [["0", 150, 56], ["90", 252, 155], ["180", 150, 254], ["270", 48, 155]].map(([text, x, y]) => h("text", { x, y, "text-anchor": "middle" }, text));
   const angle = pair("Angle on the turn", "deg");
   const turns = pair("Whole turns");
   const rows = SHOWN.map(([name, text]) => [name, pair(text)]);
   const said = h("p", { role: "status" });
   root.append(h("h1", {}, "Dial"),
-    h("svg", { viewBox: "0 0 302 304", class: "drawing", role: "img", "aria-label": "Dial; the angle stands beside it" },
+    h("svg", { viewBox: "0 0 302 304", class: "drawing narrow", role: "img", "aria-label": "Dial; the angle stands beside it" },
       h("circle", { cx: 150, cy: 150, r: 130, class: "faint" }), marks, names,
       h("path", { d: "M150 20 l-8 -14 h16 z", class: "dot" }), wanted, hand),
     h("p", { class: "hint" }, "Solid: where the table is. Dashed: where it is sent. The triangle is the wrap: there the count goes on while the sensor begins again at 0."),

@@ -6,7 +6,7 @@ look, between two steps, and so no step finds half of an edit and a session repe
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from detent.control.guard import FOLLOWING
 from detent.control.guard import TRAVEL as END_OF_TRAVEL
@@ -249,9 +249,10 @@ def live_motor(spec: StepperEnvelopeSpec, name: str, operation: Callable[..., Op
 
     numbers = {FAULTS + INFEASIBLE: FOLLOWING, FAULTS + OUT_OF_RANGE: END_OF_TRAVEL}
     zones = tables.up.zones
-    data = {
-        "edges": [table.mechanics.lower_end + int(edge) * table.step for edge in zones.edges],
-        "speeds": [zones.limits[number] * table.step for number in zones.numbers],
+    limits: Sequence[float] = zones.limits
+    data: dict[str, list[float]] = {
+        "edges": [table.mechanics.lower_end + edge * table.step for edge in zones.edges.tolist()],
+        "speeds": [limits[number] * table.step for number in zones.numbers.tolist()],
     }
     return Live(
         motor.p, motor.r, q, memory, tick, speed=table.limits.speed, view={"title": "Envelope", "data": data},
