@@ -57,9 +57,6 @@ from detent.methods.stepper_envelope.stage_job import Change, StageMove
 from detent.operate.faults import injection_of
 from detent.operate.host import Ending, Host, repeat
 from detent.operate.session import Session
-from detent.planning import course
-from detent.operate.host import Ending, repeat
-from detent.operate.session import Session
 from detent.operate.words import why_not_moving
 from detent.planning import course
 from detent.planning.course import advance as advance_course
@@ -1681,6 +1678,8 @@ def test_39_minutes_without_a_fault(name):
 def test_39_an_hour_without_a_fault(name):
     faults, motions = false_alarms(name, 3600.0)
     assert (faults, motions > 300) == (0, True)
+
+
 # ---- the panel, in a real browser
 
 LEASE = 0.2  # of a jog [s]

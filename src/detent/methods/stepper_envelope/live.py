@@ -255,8 +255,17 @@ def live_motor(spec: StepperEnvelopeSpec, name: str, operation: Callable[..., Op
         "speeds": [limits[number] * table.step for number in zones.numbers.tolist()],
     }
     return Live(
-        motor.p, motor.r, q, memory, tick, speed=table.limits.speed, view={"title": "Envelope", "data": data},
-        feed=motor.feed, fault=fault, places=places(tick), fault_numbers=numbers,
+        motor.p,
+        motor.r,
+        q,
+        memory,
+        tick,
+        speed=table.limits.speed,
+        view={"title": "Envelope", "data": data},
+        feed=motor.feed,
+        fault=fault,
+        places=places(tick),
+        fault_numbers=numbers,
     )
 
 
