@@ -36,7 +36,6 @@ from tests.live_course import COMPILED, COVERED, bound, hunted, under_way
 from tests.live_home import WAYS, Lost, zeros
 from tests.places import ROOT
 from tests.unit.planning import test_course
-from tests.live_home import WAYS, Lost, zeros
 
 import detent
 from detent.control import homing
