@@ -121,7 +121,7 @@ def named_path(name, path):
 
 
 HELD = {"axis.name", "axis.method", "axis.motion", "disturbance.push.force", "disturbance.push.at"}
-ASIDE = ("disturbance.push", LOAD, BURST)
+ASIDE = ("disturbance.push", LOAD, BURST, "home.", "hardware.")
 """Tables that are there as a whole or not at all."""
 
 

@@ -323,7 +323,7 @@ def test_whatever_stands_at_a_prompt_takes_one_screen(run: detent.Run) -> None:
         assert_one_screen(shown)
     assert repr(run).startswith("Printed letter.txt on print head.")
     assert "worst 5.7 µm" in repr(run)
-    checked = detent.load(detent.example("cascade.toml"), ["method.position_gain=250"]).check()
+    checked = detent.load(detent.example("cascade.toml"), ["method.position_gain=400"]).check()
     assert all(str(one)[:60] in repr(checked) for one in checked.warnings)
     assert len(checked.warnings) > 0
 

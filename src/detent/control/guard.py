@@ -33,7 +33,9 @@ class GuardParams(Registers):
     saturated: i4 = register("samples with the command at its limit until that is a fault", unit="count")
     stuck: i4 = register("samples at rest under effort that breaks it loose until that is a fault", unit="count")
     reversed: i4 = register("samples of such an effort in which the axis may speed up against it", unit="count")
-    softly: i8 = register("faults at which the drive goes on, for somebody brings the axis to rest: a bit per number")
+    softly: i8 = register(
+        "faults at which the drive goes on, for somebody brings the axis to rest: a bit per number", unit="code"
+    )
 
 
 class Conduct(Registers):
@@ -55,7 +57,7 @@ class Guard(Registers):
     hard: u1 = register("first of them that switches off, 0 none", unit="code")
     side: i1 = register("of a fault of the travel: the end that was passed, -1 lower, 1 upper")
     fresh: u1 = register("1 until the first sample after the axis was enabled")
-    beyond: i1 = register("end of the travel that it was beyond then, and has been ever since")
+    beyond: i1 = register("end of the travel that it was beyond then, and has been ever since", unit="code")
     following: i4 = register("samples with too large a following error", unit="count")
     saturated: i4 = register("samples with the command at its limit", unit="count")
     stuck: i4 = register("samples at rest under effort", unit="count")

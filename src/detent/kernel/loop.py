@@ -154,7 +154,9 @@ def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 
 
 
 def run_disturbed(p: Any, r: Any, f: Any, most: int, *feed: Any) -> int:
-    """The same as `run_stretch` while a fault is injected."""
+    """The same as `run_stretch` while a fault is injected; where nothing can be, it is that."""
+    if type(p) not in _DISTURBS:
+        return run_stretch(p, r, most, *feed)
     tick, n = _DISTURBS[type(p)], 0
     while n < most and tick(p, r, f, *feed):
         n += 1
@@ -163,7 +165,10 @@ def run_disturbed(p: Any, r: Any, f: Any, most: int, *feed: Any) -> int:
 
 @extending.overload(run_disturbed)
 def _run_disturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 - as above
-    tick = _DISTURBS[p.registers]
+    tick = _DISTURBS.get(p.registers)
+
+    def undisturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> int:  # noqa: ARG001 - as above
+        return run_stretch(p, r, most, *feed)
 
     def compiled(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> int:
         n = 0
@@ -171,7 +176,7 @@ def _run_disturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> Any:  # noq
             n += 1
         return n
 
-    return compiled
+    return compiled if tick else undisturbed
 
 
 def lay_ready(values: NDArray[Any]) -> HostArray:

@@ -22,7 +22,9 @@ from detent.methods.cascade.controller import CascadeLines
 from detent.operate.drivers import cia402
 from detent.operate.drivers.canopen_drive import CanopenDrive, read_address
 from detent.operate.drivers.driver import Link, driver_of
+from detent.operate.session import Session
 from detent.operate.wires import Ends, Wires, give_lines, take_lines
+from detent.operate.words import why_not_moving
 
 MS = 1_000_000
 SAID = "canopen 0x2a.0x1.0x3.0x7"
@@ -362,6 +364,4 @@ def test_why_not_moving_names_the_bar():
     bench.pass_time(0.01)
     bench.operation.barred = DRIVE_LOST
     assert bench.do(ops.ENABLE).why == DRIVE_LOST
-    from detent.operate.words import status_of, why_not_moving
-
-    assert any("(40)" in what for what, _ in why_not_moving(status_of(bench.host, "")))
+    assert any("(40)" in what for what, _ in why_not_moving(Session(bench.host, {}).status()))
