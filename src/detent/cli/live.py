@@ -1,11 +1,14 @@
 """`detent live` and `detent connect`: an axis under somebody's hand."""
 
 import json
+import os
+import select
 import shlex
 import signal
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -83,18 +86,15 @@ def live(
         drive=drive,
     )
     recorder = _record(host, record) if record else None
-    missing, left, watchdog = host.start(), threading.Event(), Watchdog(host.board, board)
+    missing, left, watchdog = host.start(), Ending(), Watchdog(host.board, board)
     about = {"name": name, "file": str(file), "simulated": host.link is None, "speed": speed}
     session = Session(host, about, _axis_file(read))
     status = session.status()
     audit = Audit(Path(status["store"]["path"] if status["store"] else channel_of(file)).with_suffix(".audit"))
     channel = place.serve(session, audit)
 
-    def leave(_number: int, _frame: object) -> None:
-        left.set()
-
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, leave)
+        signal.signal(number, left.ask)
     panel = None if headless else Child(channel.path, at)
     links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
     told = session.describe()
@@ -121,6 +121,23 @@ def live(
     _tell_end(session, as_json=as_json)
     if died:
         raise typer.Exit(NOT_DONE)
+
+
+class Ending:
+    """Whether somebody has asked for the end: by signals, of which one may come while another is heeded."""
+
+    def __init__(self) -> None:
+        self._hears, self._tells = os.pipe()
+        os.set_blocking(self._tells, False)
+
+    def ask(self, _number: int, _frame: object) -> None:
+        """Ask for it; a lock would wait for whoever was interrupted, for ever."""
+        with suppress(BlockingIOError):
+            os.write(self._tells, b".")
+
+    def wait(self, seconds: float) -> bool:
+        """Wait so long at most; True once it was asked for."""
+        return bool(select.select([self._hears], [], [], seconds)[0])
 
 
 def _tell_end(session: Any, *, as_json: bool) -> None:

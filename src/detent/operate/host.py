@@ -177,6 +177,7 @@ class Host:
 
     def _run(self, periods: int) -> int:
         if self.link is not None and not self.is_running:  # no wall clock: an exchange, then a period
+            self._run_loop(0)  # compiles: from the first exchange on the drive waits for a heartbeat
             for _ in range(periods):
                 self.link.exchange()
                 self._run_loop(1)

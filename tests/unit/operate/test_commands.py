@@ -372,3 +372,10 @@ def test_46_the_position_table_from_a_second_terminal(folder: Path) -> None:
     assert (missing.returncode, missing.stdout) == (2, "")
     assert "load" in missing.stderr
     live.end()
+
+
+def test_signals_that_come_all_at_once_end_it(running: Running) -> None:
+    """A second Ctrl-C while the first was heeded waited for itself for ever, and the axis stayed live."""
+    for number in (signal.SIGINT, signal.SIGTERM) * 50:
+        running.process.send_signal(number)
+    assert running.end()["state"] == "switch on disabled"

@@ -353,8 +353,12 @@ def test_detent_live_runs_on_a_drive_over_a_serial_bus(tmp_path):
             assert any("6007" in fact for fact in said["drive"])
             with detent.connect(Path(said["channel"])) as axis:
                 assert axis.position == pytest.approx(0.02, abs=2e-6)
-                with pytest.raises(DetentError, match=SAID):
-                    axis.enable()
+                refused = ""
+                while SAID not in refused:  # a busy machine may lose the heartbeat for a while
+                    with pytest.raises(DetentError) as told:
+                        axis.enable()
+                    refused = str(told.value)
+                    assert SAID in refused or "(40)" in refused
             process.terminate()
             assert process.wait(timeout=60) == 0
 

@@ -113,7 +113,7 @@ def until(met: Callable[[], bool]) -> None:
 def running(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", dict[str, Any], Any, Path]]:
     """`detent live` as a process: what it has said, its board, its file."""
     file = Path(shutil.copy(EXAMPLES / "cascade.toml", folder))
-    words = [sys.executable, "-m", "detent", "live", str(file), "--json", "--period", "10 ms"]
+    words = [sys.executable, "-m", "detent", "live", str(file), "--headless", "--json", "--period", "10 ms"]
     env = os.environ | {"XDG_RUNTIME_DIR": str(folder)}
     process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=env)
     try:
