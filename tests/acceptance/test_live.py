@@ -2052,7 +2052,9 @@ def test_46_positions_are_taught_typed_and_taken_back(tmp_path: Path) -> None:
 
 @pytest.mark.wide
 @pytest.mark.process
-def test_29_the_drive_may_be_another_process_on_a_serial_bus():
+def test_29_the_drive_may_be_another_process_on_a_serial_bus(monkeypatch):
+    # Two processes on a busy machine: how soon silence is a fault, test 30 sees.
+    monkeypatch.setattr("detent.operate.drivers.canopen_drive.HEARTBEAT", 2.0)
     with live_drive.wire() as (near, far), live_drive.served(f"slcan:{far}@5"):
         live_drive.open_late(f"slcan:{near}@5")
         with live_drive.driven(f"slcan:{near}@5") as bench:
