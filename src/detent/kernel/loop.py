@@ -165,7 +165,7 @@ def run_disturbed(p: Any, r: Any, f: Any, most: int, *feed: Any) -> int:
 
 @extending.overload(run_disturbed)
 def _run_disturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 - as above
-    tick = _DISTURBS.get(p.registers)
+    tick: Any = _DISTURBS.get(p.registers)
 
     def undisturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> int:  # noqa: ARG001 - as above
         return run_stretch(p, r, most, *feed)
