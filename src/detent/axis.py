@@ -313,7 +313,7 @@ class Axis(OnScreen):
         Parameters
         ----------
         ms : float
-            Largest sensitivity, the peak of ``|1/(1 + L)|`` where a loop is cut, 1.2 to 2.5. It guarantees a gain margin of
+            Largest sensitivity, the peak of ``|1/(1 + L)|`` where a loop is cut, 1.2 to 2.5. It leaves a gain margin of
             Ms/(Ms - 1) and a phase margin of 2 asin(1/(2 Ms)).
         overshoot : float
             Largest peak of the reference to the position without feedforward, 1 to 2.
