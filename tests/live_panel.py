@@ -7,10 +7,13 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any, Self
 
 import httpx
+from starlette.routing import Mount, Route, WebSocketRoute
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from detent.operate.audit import Audit
@@ -124,3 +127,51 @@ class PanelRig:
         self.audit.close()
         if self.bench.host.is_running:
             self.bench.host.close()
+
+
+def routes_of(rig: PanelRig) -> list[tuple[str, str]]:
+    """Every route with each of its methods, from the application itself."""
+    found: list[tuple[str, str]] = []
+    for route in rig.panel.app().routes:
+        if isinstance(route, Route):
+            found += [(method, route.path) for method in sorted(route.methods or ())]
+        elif isinstance(route, Mount):
+            found.append(("GET", f"{route.path}/panel.css"))
+        else:
+            assert isinstance(route, WebSocketRoute)
+    return found
+
+
+def status(rig: PanelRig, method: str, path: str, role: str = "engineer", **headers: str) -> int:
+    """What a request is answered, by somebody of a role, from the panel's own page unless told otherwise."""
+    said = {"host": f"127.0.0.1:{rig.port}"} | ({"origin": rig.base} if method == "POST" else {})
+    if role:
+        name, value = next(iter(rig.cookie(role).items()))
+        who = rig.panel.keys.read(value, COOKIE)
+        assert who is not None
+        said |= {"cookie": f"{name}={value}", "x-csrf-token": rig.panel.keys.form_mark(who)}
+    asked = HTTPConnection("127.0.0.1", rig.port, timeout=10.0)
+    asked.putrequest(method, path, skip_host=True)
+    for name, value in (said | {name.replace("_", "-"): value for name, value in headers.items()}).items():
+        asked.putheader(name, value)
+    asked.endheaders()
+    answered = asked.getresponse().status
+    asked.close()
+    return answered
+
+
+def code(dialled: ClientConnection, first: str) -> int:
+    """With which code a socket is closed after its first word; 0 where it is let in."""
+    with dialled:
+        dialled.send(first)
+        try:
+            dialled.recv(timeout=10.0)
+        except ConnectionClosed as closed:
+            return closed.rcvd.code if closed.rcvd else -1
+        return 0
+
+
+def flood(socket: Socket) -> None:
+    """Ask without end."""
+    while True:
+        socket.dialled.send('{"do": "confirm"}')

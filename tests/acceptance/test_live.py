@@ -6,14 +6,19 @@ import mmap
 import os
 import random
 import shutil
+import signal
 import sqlite3
+import ssl
+import stat
+import struct
 import subprocess
 import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -21,11 +26,21 @@ from random import Random
 from typing import Any
 
 import can
+import httpx
 import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests import live_course, live_drive, live_faults, live_frames
+from tests import (
+    live_course,
+    live_drive,
+    live_faults,
+    live_frames,
+    live_panel,
+    live_processes,
+    live_requests,
+    live_store,
+)
 from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
 from tests.course_rig import excursions, follow, shortest_stop, turns
 from tests.difference import diff
@@ -34,8 +49,11 @@ from tests.live_bench import MOVED, OPERATED, Bench
 from tests.live_browser import Script, panelled, run_script, until
 from tests.live_course import COMPILED, COVERED, bound, hunted, under_way
 from tests.live_home import WAYS, Lost, zeros
+from tests.live_panel import PanelRig
+from tests.live_rig import SENSORS, memory_folder, open_store, read
 from tests.places import ROOT
 from tests.unit.planning import test_course
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 import detent
 from detent.control import homing
@@ -51,6 +69,7 @@ from detent.kernel.loop import advance, replay
 from detent.kernel.registers import CONTROLLER, PLANT, Registers
 from detent.methods.cascade.system import Cascade, along
 from detent.methods.load import load_spec
+from detent.methods.position import Sensed
 from detent.methods.print_head.controller import PERIOD_US
 from detent.methods.print_head.print_job import load_job
 from detent.methods.print_head.run import SimulatedPrinting, print_job
@@ -58,12 +77,26 @@ from detent.methods.registry import METHODS
 from detent.methods.stepper_envelope.host import StageHost
 from detent.methods.stepper_envelope.stage_job import Change, StageMove
 from detent.operate.faults import injection_of
-from detent.operate.host import Ending, Host, repeat
+from detent.operate.host import Ending, Host, Log, repeat
+from detent.operate.opening import meanings, store_path
 from detent.operate.session import Session
+from detent.operate.start import make_host
+from detent.operate.trust import Trust, Why
 from detent.operate.words import why_not_moving
+from detent.panel import app as panel_app
+from detent.panel.child import PanelPlace
+from detent.panel.gate import Rule
+from detent.panel.keys import LINK, ROLES, keep_keys, link_of, make_keys, sign
 from detent.planning import course
 from detent.planning.course import advance as advance_course
 from detent.plant.injection import BLOCKED
+
+
+def in_wall_time(test: Callable[..., None]) -> Callable[..., None]:
+    """A test of a loop that runs as compiled code, or of processes that hold one."""
+    skipped = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time")
+    return pytest.mark.compiled(skipped(test))
+
 
 SAMPLES = 50
 """Of the standard job, each of so many ticks as it takes from one to the next: both of its commands."""
@@ -910,8 +943,7 @@ def test_27_fifty_moves_live_end_in_the_window_and_are_repeated():
     assert diff(live.host.axis.state, again.host.axis.state) == {}
 
 
-@pytest.mark.compiled
-@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time")
+@in_wall_time
 def test_05_a_busy_thread_of_python_does_not_delay_the_loop():
     """A thread that computes without yielding, beside the loop and beside one written in Python, in the same run.
 
@@ -1977,8 +2009,7 @@ def test_47_scope_shows_the_edge_at_its_trigger(tmp_path: Path) -> None:
     assert "1/Δt" in found["cursors"]
 
 
-@pytest.mark.compiled
-@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time")
+@in_wall_time
 def test_48_why_not_moving_names_what_is_not_met() -> None:
     """Fifteen situations, each made at the axis: its reason and its remedy, and those alone."""
     host = Bench("cascade").host
@@ -2131,3 +2162,714 @@ def test_32_another_hardware_is_not_enabled(file):
 def test_31_no_wrong_value_comes_over_a_serial_line_and_every_gap_is_counted(tmp_path):
     """Of 100,000 frames one in a hundred is lost, and one in a hundred has one to eight of its bits turned."""
     live_frames.receive_all(live_frames.in_c(tmp_path), 100_000, 2)
+
+
+@pytest.mark.wide
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are forked")
+def test_33_no_wrong_position_and_no_lost_row_after_a_thousand_kills(tried):
+    told = live_store.kill(1000)
+    live_store.check_kills(told)
+    tried("store", "host killed while it wrote and moved", "no wrong position taken, no change lost", told["kills"])
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are forked")
+def test_33_no_wrong_position_and_no_lost_row_after_fifty_thousand_kills():
+    live_store.check_kills(live_store.kill(50_000))
+
+
+@live_store.needs_library
+def test_34_a_power_cut_at_every_sync_leaves_old_or_new():
+    with memory_folder() as folder:
+        told = live_store.cut_everywhere("incremental, held", 0, folder)
+    assert told["cuts"] > 150
+    assert min(told["old"], told["new"], told[Trust.UNKNOWN], told[Trust.RESTORED]) > 5
+
+
+@live_store.needs_library
+@pytest.mark.parametrize("synchronous", ["OFF", "NORMAL"])
+def test_34_a_protocol_that_syncs_less_is_found_out(synchronous):
+    with memory_folder() as folder, pytest.raises(AssertionError):
+        live_store.cut_everywhere("incremental, held", 4, folder, synchronous)
+
+
+@live_store.needs_library
+@pytest.mark.wide
+@pytest.mark.parametrize("name", ["incremental, held", "absolute", "band, held", "circle"])
+def test_34_a_power_cut_with_writes_torn_and_lost_leaves_old_or_new(name, tried):
+    with memory_folder() as folder:
+        told = live_store.cut_everywhere(name, 8, folder)
+    assert told["disks"] > 1000
+    assert min(told["old"], told[Trust.UNKNOWN], told[Trust.RESTORED]) > 300
+    # A change is new before it is told to be made only while its journal is being cut off.
+    assert told["new"] > 5
+    tried("store", "power cut, writes lost and torn", "old or new, never more trusted", told["disks"])
+
+
+@pytest.mark.parametrize("edit", live_store.EDITS)
+def test_35_a_store_of_another_axis_is_kept_aside_and_both_are_shown(tmp_path, edit):
+    made, path = SENSORS["absolute"], tmp_path / "axis.toml.state"
+    live_store.taught_store(path, made)
+    before, other = path.read_bytes(), replace(made, **live_store.EDITS[edit])
+    with open_store(path, other) as store:
+        assert store.restore(4923) == store.standing
+        assert store.standing.why is Why.NEW
+        assert store.positions == {}
+        aside = store.aside
+        assert aside is not None
+        assert aside.path.read_bytes() == before
+        names = {name: pair for name, pair in aside.differs.items() if not (edit == "scale" and name == "travel")}
+        expected = {"scale": "scale", "origin": "scale", "travel": "travel"}.get(edit, "sensor")
+        assert names == {expected: (meanings(made)[expected], meanings(other)[expected])}
+        assert all(text in str(aside) for pair in aside.differs.values() for text in pair)
+        assert [one.counts for one in aside.positions] == [5000]
+    # What was kept aside is still the store of the axis that it was made for.
+    aside.path.rename(path)
+    with open_store(path, made) as store:
+        assert store.aside is None
+        assert store.restore(4923).counts == 5000
+
+
+def test_35_an_edit_of_gains_keeps_the_position(tmp_path):
+    file = EXAMPLES / "cascade.toml"
+    before = live_store.sensors_of(file)
+    assert live_store.sensors_of(file, "method.position_gain=31", "limits.speed=0.1 m/s") == before
+    other = {"encoder.resolution=3 um": "scale", "limits.travel=0.71 m": "travel"}
+    for override, name in other.items():
+        after = live_store.sensors_of(file, override)
+        assert [key for key in before if before[key] != after[key]] == [name]
+    assert store_path(tmp_path / file.name).name == "cascade.toml.state"
+
+
+@pytest.mark.parametrize("name", [name for name, made in SENSORS.items() if made.kind is not Sensed.INCREMENTAL])
+@pytest.mark.parametrize("moved", [6, -6, 700, -1500])
+def test_36_an_axis_that_was_moved_while_off_is_not_restored_and_the_distance_is_shown(tmp_path, name, moved):
+    made, path = SENSORS[name], tmp_path / "axis.state"
+    live_store.taught_store(path, made)
+    with open_store(path, made) as store:
+        assert store.restore(read(made, 5000, 77)).trust is (Trust.UNKNOWN if name == "band" else Trust.RESTORED)
+        assert store.restore(read(made, 5000 + made.window, 77)).distance == made.window
+        judged = store.restore(read(made, 5000 + moved, 77))
+        assert (judged.trust, judged.counts) == (Trust.UNKNOWN, None)
+        assert (judged.shown, judged.distance) == (5000 + moved, moved)
+        assert judged.why is (Why.AMBIGUOUS if name == "band" else Why.MOVED)
+        assert f"{moved} um" in judged.describe(made) or f"{moved / 1000} mm" in judged.describe(made)
+        if name != "band":
+            assert store.confirm().counts == 5000 + moved
+            assert store.trust is Trust.RESTORED
+
+
+OPENSSL = shutil.which("openssl")
+
+
+@pytest.fixture(scope="module")
+def panel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PanelRig]:
+    """A panel whose axis stands still, but takes what is asked."""
+    with PanelRig(tmp_path_factory.mktemp("panel")) as made:
+        yield made
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """An axis file, and a folder of its own for channels."""
+    with live_processes.live_folder(tmp_path) as made:
+        yield made
+
+
+@pytest.fixture
+def running(folder: Path) -> live_processes.Running:
+    """The axis live."""
+    # Other tests want the processors, too.
+    return live_processes.Running(folder / "slide.toml", "--headless", "--no-store", "--period", "10 ms")
+
+
+@in_wall_time
+def test_49_every_route_refuses_whom_its_rule_does_not_name(panel: PanelRig) -> None:
+    assert len(live_panel.routes_of(panel)) >= 12
+    for method, path in live_panel.routes_of(panel):
+        rule = panel_app.RULES["/static" if path.startswith("/static") else path]
+        assert live_panel.status(panel, method, path, origin="http://evil.example") == 403
+        assert live_panel.status(panel, method, path, origin="null") == (200 if rule.stops else 403)
+        assert live_panel.status(panel, method, path, host="evil.example") == 421
+        assert live_panel.status(panel, method, path, host=f"127.0.0.1.evil.example:{panel.port}") == 421
+        assert live_panel.status(panel, method, path, host="127.0.0.1:1") == 421
+        assert live_panel.status(panel, method, path, content_length=str((1 << 20) + 1)) == 413
+        assert live_panel.status(panel, method, path, transfer_encoding="chunked") == 411
+        if path == "/enter":  # shows its own ticket
+            continue
+        assert live_panel.status(panel, method, path, role="") == 401
+        for role in ROLES:
+            permitted = ROLES.index(role) >= ROLES.index(rule.role)
+            assert (live_panel.status(panel, method, path, role) in {200, 303, 400, 404}) == permitted
+            assert permitted or live_panel.status(panel, method, path, role) == 403
+        if rule.changes:
+            assert live_panel.status(panel, method, path, x_csrf_token="0" * 64) == 403
+            assert live_panel.status(panel, method, path, origin="") == 403
+
+
+@in_wall_time
+def test_49_a_route_without_a_rule_lets_nobody_in(panel: PanelRig, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert live_panel.status(panel, "GET", "/api/describe") == 200
+    monkeypatch.delitem(panel_app.RULES, "/api/describe")
+    assert live_panel.status(panel, "GET", "/api/describe") == 403
+    assert set(panel_app.RULES) | {"/api/describe"} == {route.path for route in panel.panel.app().routes}  # type: ignore[attr-defined]
+    monkeypatch.setitem(panel_app.RULES, "/api/describe", Rule("engineer"))
+    assert [live_panel.status(panel, "GET", "/api/describe", role) for role in ROLES] == [403, 403, 200]
+
+
+@in_wall_time
+@pytest.mark.parametrize("role", ROLES)
+def test_49_stop_is_taken_from_every_role(panel: PanelRig, role: str) -> None:
+    stops = panel.bench.loop.stops
+    assert live_panel.status(panel, "POST", "/stop", role) == 200
+    assert live_panel.status(panel, "POST", "/stop", role, origin="null", sec_fetch_site="same-origin") == 200
+    assert live_panel.status(panel, "POST", "/stop", role, origin="null", sec_fetch_site="cross-site") == 403
+    assert panel.bench.loop.stops == stops + 2
+    with panel.browser(role).socket() as socket:
+        assert "id" in socket.ask(do="stop")
+        assert "id" in socket.ask(do="disable")
+    assert panel.bench.loop.stops == stops + 3
+
+
+@in_wall_time
+def test_49_a_form_without_scripts_stops_and_comes_back(panel: PanelRig) -> None:
+    browser, stops = panel.browser("viewer"), panel.bench.loop.stops
+    page = browser.http.get("/").text
+    assert 'action="/stop" method="post"' in page
+    assert "SIMULATION" in page
+    assert "&lt;b&gt;axis&lt;/b&gt;" in page
+    assert "<b>axis" not in page
+    answer = browser.http.post("/stop", headers={"accept": "text/html", "origin": "null"})
+    assert (answer.status_code, answer.headers["location"]) == (303, "/")
+    assert panel.bench.loop.stops == stops + 1
+
+
+@in_wall_time
+def test_49_a_viewer_watches_and_moves_nothing(panel: PanelRig) -> None:
+    written = int(panel.bench.host.board.inbox.written)
+    words = set(panel.session.describe()["commands"]) - {"stop", "disable"}
+    with panel.browser("viewer").socket() as socket:
+        for word in sorted(words):
+            assert "a viewer may not" in socket.ask(do=word, value="1 mm")["error"]
+        assert "status" in socket.ask(do="status")
+        assert "watch" in socket.ask(do="watch", channels=["position"])
+        assert "may not note" in socket.ask(do="note", who="engineer", what="lies")["error"]
+    assert int(panel.bench.host.board.inbox.written) - written <= 1  # it leaves
+
+
+@in_wall_time
+def test_49_an_operator_sets_no_trust(panel: PanelRig) -> None:
+    with panel.browser("operator").socket() as socket:
+        assert "needs engineer" in socket.ask(do="trust", value=2)["error"]
+        assert "id" in socket.ask(do="enable")
+
+
+@in_wall_time
+@pytest.mark.parametrize(
+    "first",
+    ["", "no JSON", "[]", "7", '{"ticket": null}', '{"ticket": "a.b.c"}', '{"ticket": "viewer.0.9.x"}', "[" * 9000],
+)
+def test_49_a_socket_needs_a_ticket(panel: PanelRig, first: str) -> None:
+    assert live_panel.code(panel.browser().dial(), first) == 1008
+
+
+@in_wall_time
+def test_49_a_ticket_serves_once_for_its_own_role_and_not_for_long(
+    panel: PanelRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    browser = panel.browser()
+    ticket = browser.ticket()
+
+    def shown(ticket: str) -> str:
+        return json.dumps({"ticket": ticket})
+
+    assert live_panel.code(browser.dial(), shown(ticket)) == 0
+    assert live_panel.code(browser.dial(), shown(ticket)) == 1008
+    assert live_panel.code(panel.browser("viewer").dial(), shown(browser.ticket())) == 1008
+    late = browser.ticket()
+    monkeypatch.setattr(panel.panel.keys, "_clock", lambda: time.time() + 11.0)
+    assert live_panel.code(browser.dial(), shown(late)) == 1008
+
+
+@in_wall_time
+def test_49_a_socket_without_cookie_or_from_another_page_is_refused(panel: PanelRig) -> None:
+    for browser, more in (
+        (panel.browser(""), {}),
+        (panel.browser(), {"origin": "http://evil.example"}),
+        (panel.browser(), {"origin": None}),
+        (panel.browser(), {"origin": "null"}),
+        (panel.browser(), {"origin": f"http://127.0.0.1.evil.example:{panel.port}"}),
+    ):
+        with pytest.raises(InvalidStatus) as refused:
+            browser.dial(**more)
+        assert refused.value.response.status_code == 403
+
+
+@in_wall_time
+def test_49_oversized_and_malformed_frames_are_refused(panel: PanelRig) -> None:
+    with panel.browser().socket() as socket:
+        for sent, told in (
+            ("no JSON", "is JSON"),
+            ("[" * 60_000, "is JSON"),
+            (b"\0\1", "is JSON"),
+            ("[]", '"do"'),
+            ('{"do": 7, "as": 1}', '"do"'),
+            ('{"do": "stop", "as": {}}', '"as"'),
+            ('{"do": "dance", "as": 2}', "no command 'dance'"),
+            ('{"do": "move_to", "as": 3, "value": {"a": 1}}', "5 mm"),
+            ('{"do": "move_to", "as": 4, "value": "1 mm", "speed": "fast"}', "speed"),
+            ('{"do": "watch", "as": 5, "rate": 1000}', "rate"),
+            ('{"do": "watch", "as": 6, "channels": ["nothing"]}', "channels"),
+            ('{"do": "watch", "as": 7, "who": "x"}', "who"),
+        ):
+            socket.dialled.send(sent)
+            assert told in socket.until("error")["error"]
+        assert "status" in socket.ask(do="status")
+        with pytest.raises(ConnectionClosed) as closed:
+            socket.ask(do="status", value="x" * (1 << 16))
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1009
+
+
+@in_wall_time
+def test_49_there_are_sixteen_sockets(panel: PanelRig) -> None:
+    browser = panel.browser("viewer")
+    with ExitStack() as others:
+        for _ in range(16):
+            other = others.enter_context(browser.dial())
+            other.send(json.dumps({"ticket": browser.ticket()}))
+            assert other.recv(timeout=10.0)
+        assert live_panel.code(browser.dial(), json.dumps({"ticket": browser.ticket()})) == 1013
+
+
+@in_wall_time
+def test_50_no_key_ticket_or_cookie_is_told_anywhere(panel: PanelRig) -> None:
+    browser = panel.browser()
+    ticket, link = browser.ticket(), sign(panel.keys["viewer"], "viewer", LINK, time.time())
+    for signed in (link, link, "engineer.0.0.wrong"):
+        browser.http.get("/enter", params={"ticket": signed})
+    with browser.socket() as socket:
+        told = [json.dumps(socket.ask(do=word)) for word in ("status", "describe", "log")]
+    pages = [browser.http.get(path) for path in ("/", "/api/describe", "/api/log", "/api/axis")]
+    everything = "".join([*told, *(page.text for page in pages), json.dumps(panel.audit.recent())])
+    secrets = [ticket, link, *panel.keys.values(), *browser.http.cookies.values()]
+    assert [secret for secret in secrets if secret.rpartition(".")[2] in everything] == []
+    for page in pages:
+        assert page.headers["referrer-policy"] == "no-referrer"
+        assert page.headers["cache-control"] == "no-store"
+        assert "default-src 'none'" in page.headers["content-security-policy"]
+        assert "unsafe" not in page.headers["content-security-policy"]
+        assert "access-control-allow-origin" not in page.headers
+
+
+@in_wall_time
+def test_50_a_link_works_once_and_leaves_a_cookie_that_no_script_reads(panel: PanelRig) -> None:
+    link = {"ticket": sign(panel.keys["operator"], "operator", LINK, time.time())}
+    with httpx.Client(base_url=panel.base) as client:
+        first = client.get("/enter", params=link)
+        cookie = first.headers["set-cookie"]
+        assert "HttpOnly" in cookie
+        assert "SameSite=strict" in cookie
+        assert client.get("/enter", params=link).status_code == 401
+        assert client.get("/").status_code == 200
+    old = {"ticket": sign(panel.keys["operator"], "operator", LINK, time.time() - 601.0)}
+    assert httpx.get(panel.base + "/enter", params=old).status_code == 401
+    assert httpx.get(panel.base, cookies=panel.cookie("viewer", time.time() - 12 * 3600 - 1)).status_code == 401
+    forged = {panel.panel.here.cookie: sign(panel.keys["viewer"], "engineer", "cookie", time.time())}
+    assert httpx.get(panel.base, cookies=forged).status_code == 401
+
+
+def test_50_only_this_user_reads_the_keys(tmp_path: Any) -> None:
+    path, keys = tmp_path / "axis.keys", make_keys()
+    path.write_text("left over", encoding="ascii")
+    path.chmod(0o666)
+    keep_keys(path, "http://127.0.0.1:1", keys)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert len(set(keys.values())) == len(ROLES)
+    assert min(map(len, keys.values())) >= 43  # 256 bits
+    assert keys["viewer"] not in link_of(path, "viewer", time.time())
+    with pytest.raises(DetentError, match="viewer, operator, engineer"):
+        link_of(path, "root", time.time())
+
+
+@in_wall_time
+def test_50_51_who_did_what_is_appended(panel: PanelRig) -> None:
+    with panel.browser("operator").socket() as socket:
+        asked = socket.ask(do="enable")["id"]
+        socket.ask(do="move_to", value="5 V")
+    records = panel.audit.recent()["records"]
+    mine = next(one for one in records if one.get("id") == asked)
+    assert mine["do"] == "enable"
+    assert mine["who"].startswith("operator ")
+    assert mine["who"].endswith("from 127.0.0.1")
+    assert any(one.get("do") == "move_to" and "error" in one for one in records)
+    assert panel.audit.file is not None
+    panel.audit.file.flush()
+    assert [json.loads(line) for line in panel.audit.file.path.read_text(encoding="utf-8").splitlines()][
+        -len(records) :
+    ] == records
+    assert stat.S_IMODE(panel.audit.file.path.stat().st_mode) == 0o600
+
+
+@pytest.mark.parametrize("bind", ["192.168.1.20", "10.0.0.1", "2001:db8::1", "fe80::1"])
+def test_51_a_network_is_refused_without_tls(bind: str, tmp_path: Any) -> None:
+    with pytest.raises(DetentError, match="--i-accept-plain-http"):
+        PanelPlace(bind).check()
+    accepted = PanelPlace(bind, plain=True)
+    accepted.check()
+    assert accepted.on_network
+    pem = tmp_path / "pem"
+    pem.touch()
+    encrypted = PanelPlace(bind, certificate=str(pem), key_file=str(pem))
+    encrypted.check()
+    assert not encrypted.on_network
+
+
+@pytest.mark.parametrize(
+    ("place", "told"),
+    [
+        (PanelPlace("0.0.0.0", plain=True), "every network"),  # noqa: S104 - it is refused
+        (PanelPlace("::", plain=True), "every network"),
+        (PanelPlace("axis.example", plain=True), "expected an address"),
+        (PanelPlace("127.0.0.1", certificate="a.pem"), "both"),
+        (PanelPlace("127.0.0.1", certificate="no.pem", key_file="no.pem"), "no such file"),
+    ],
+)
+def test_51_what_cannot_work_is_refused(place: PanelPlace, told: str) -> None:
+    with pytest.raises(DetentError, match=told):
+        place.check()
+
+
+@in_wall_time
+@pytest.mark.process
+@pytest.mark.skipif(OPENSSL is None, reason="makes the certificate")
+def test_51_with_a_certificate_all_goes_encrypted(tmp_path: Any) -> None:
+    certificate, key = str(tmp_path / "axis.pem"), str(tmp_path / "axis.key")
+    subprocess.run(
+        [str(OPENSSL), "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+         "-days", "2", "-subj", "/CN=axis", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key,
+         "-out", certificate],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    trusted = ssl.create_default_context(cafile=certificate)
+    with PanelRig(tmp_path, certificate=certificate, key_file=key) as panel:
+        base = f"https://127.0.0.1:{panel.port}"
+        link = {"ticket": sign(panel.keys["operator"], "operator", LINK, time.time())}
+        with httpx.Client(base_url=base, verify=trusted) as client:
+            assert "Secure" in client.get("/enter", params=link).headers["set-cookie"]
+            assert client.post("/stop", headers={"origin": base}).status_code == 200
+            assert client.post("/stop", headers={"origin": panel.base}).status_code == 403
+        with pytest.raises(httpx.TransportError):
+            httpx.get(panel.base)
+
+
+@in_wall_time
+def test_51_the_banner_of_plain_http_stays(panel: PanelRig, monkeypatch: pytest.MonkeyPatch) -> None:
+    browser = panel.browser()
+    assert "without encryption" not in browser.http.get("/").text
+    monkeypatch.setattr(panel.panel, "plain", True)
+    assert "without encryption" in browser.http.get("/").text
+
+
+@in_wall_time
+def test_52_a_client_that_floods_is_put_out_and_others_are_served(panel: PanelRig) -> None:
+    with panel.browser("operator").socket() as other, panel.browser("operator").socket() as flooding:
+        stops = panel.bench.loop.stops
+        for _ in range(200):  # stops are never counted
+            flooding.dialled.send('{"do": "stop"}')
+        with pytest.raises(ConnectionClosed) as closed:
+            live_panel.flood(flooding)
+        assert "status" in other.ask(do="status")
+        assert "id" in other.ask(do="stop")
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1008
+    assert panel.bench.loop.stops == stops + 201
+    asked = [one for one in panel.audit.recent()["records"] if one.get("do") == "confirm"]
+    assert 50 <= len(asked) < 150
+
+
+@in_wall_time
+def test_53_no_request_makes_the_panel_fail(panel: PanelRig) -> None:
+    live_requests.anything(panel, 300)
+
+
+@in_wall_time
+@pytest.mark.wide
+def test_53_no_request_of_thousands_makes_the_panel_fail(panel: PanelRig) -> None:
+    live_requests.anything(panel, 500 * len(RULES))
+
+
+@in_wall_time
+@pytest.mark.process
+def test_54_the_links_are_printed_and_ctrl_c_ends_both_processes(folder: Path) -> None:
+    live = live_processes.Live(folder / "slide.toml", "--period", "10 ms", "--viewer-link")
+    said: list[str] = []
+    while not said or "Ctrl-C" not in said[-1]:
+        said.append(live.out.readline())
+    text = "".join(said)
+    assert "SIMULATION; every 10 ms; switch on disabled." in text
+    links = [word for line in said for word in line.split() if word.startswith("http://127.0.0.1:")]
+    assert len(links) == 2
+    pages = [live_processes.entered(link) for link in links]
+    assert ['content="engineer"' in pages[0].http.get("/").text, 'content="viewer"' in pages[1].http.get("/").text] == [
+        True, True,
+    ]  # fmt: skip
+    another = subprocess.run(
+        [sys.executable, "-m", "detent", "connect", str(live.file), "link", "operator"],
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    third = live_processes.entered(another.strip())
+    assert third.http.get("/api/describe").json()["name"]
+    panel = live.panel_id()
+    assert "torque off" in live.end()
+    assert live.process.returncode == 0
+    assert not Path(f"/proc/{panel}").exists()
+    assert list(folder.glob("detent/*.keys")) == []
+    records = [json.loads(line) for line in live.file.with_name("slide.toml.audit").read_text("utf-8").splitlines()]
+    assert [record["note"] for record in records if "note" in record] == ["enters"] * 3
+    for page in (*pages, third):
+        page.http.close()
+
+
+@in_wall_time
+@pytest.mark.process
+def test_41_a_killed_panel_stops_the_jog_and_comes_back(folder: Path) -> None:
+    live = live_processes.Live(folder / "slide.toml", "--period", "10 ms", "--json")
+    browser = live_processes.entered(json.loads(live.out.readline())["panel"][0])
+    with detent.connect(live.file) as watcher, suppress(ConnectionClosed), browser.socket() as socket:
+        for word in ("enable", "confirm"):
+            asked = socket.ask(do=word)["id"]
+            while socket.until("ended")["ended"]["id"] != asked:
+                pass
+        socket.ask(do="jog", value="20 mm/s")
+        while watcher.status["rests"]:
+            pass
+        os.kill(live.panel_id(), signal.SIGKILL)
+        begin = time.monotonic()
+        while (status := watcher.status)["running"] or not status["rests"]:
+            assert time.monotonic() - begin < 20.0
+        assert status["client"] == 0
+        assert status["fault"] is None
+    for _ in range(500):  # it comes back at the same address, and the cookie still serves
+        with suppress(httpx.TransportError):
+            if browser.http.get("/").status_code == 200:
+                break
+        threading.Event().wait(0.02)
+    assert browser.http.post("/stop", headers={"origin": "null"}).status_code == 200
+    browser.http.close()
+    live.end()
+    assert live.process.returncode == 0
+
+
+@in_wall_time
+@pytest.mark.wide
+@pytest.mark.process
+def test_52_stop_is_quick_while_another_client_floods(folder: Path) -> None:
+    """A thousand malformed frames, then ten thousand commands a second: beside each, stops of another page."""
+    live = live_processes.Live(folder / "slide.toml", "--period", "10 ms", "--json")
+    browser = live_processes.entered(json.loads(live.out.readline())["panel"][0])
+    cookies = json.dumps(dict(browser.http.cookies))
+    with browser.socket() as socket, detent.connect(live.file) as watcher:
+        # The reference: two processes that compute beside it, as the flood and the panel that reads it do.
+        busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+        idle, late_idle = live_processes.stops(socket, watcher)
+        for one in busy:
+            one.kill()
+            one.wait()
+        for kind in ("malformed", "commands"):
+            tried = [
+                live_processes.flooded(browser, cookies, kind, socket, watcher) for _ in range(3)
+            ]  # other tests run beside it
+            assert min(under for under, _ in tried) < max(0.05, 4.0 * idle), (idle, tried)
+            assert min(late for _, late in tried) <= 1.5 * late_idle + 0.02, (late_idle, tried)
+            assert "status" in socket.ask(do="status")
+    browser.http.close()
+    live.end()
+    assert live.process.returncode == 0
+
+
+@in_wall_time
+@pytest.mark.wide
+@pytest.mark.process
+def test_57_memory_does_not_grow(folder: Path) -> None:
+    found = live_processes.soak(folder, 20.0, 20.0)
+    assert found["grown"] < 0.02
+    assert found["fault"] is None
+    assert found["rounds"] > 20
+
+
+@in_wall_time
+@pytest.mark.long
+@pytest.mark.process
+def test_57_memory_does_not_grow_for_half_an_hour(folder: Path) -> None:
+    found = live_processes.soak(folder, 60.0, 1800.0)
+    assert found["grown"] < 0.01
+    assert found["fault"] is None
+    assert found["rounds"] > 1500
+
+
+@in_wall_time
+def test_54_56_an_axis_runs_until_it_is_interrupted_and_others_move_it(
+    folder: Path, running: live_processes.Running
+) -> None:
+    file = str(folder / "slide.toml")
+    assert running.started["simulated"] is True
+    assert running.started["state"] == "switch on disabled"
+    assert running.started["period"] == 1e-2
+    with detent.connect(file) as axis:
+        assert axis.about["name"]
+        axis.enable()
+        axis.confirm()
+        at = axis.position
+        axis.move_by("5 mm")
+        assert axis.position == pytest.approx(at + 5e-3, abs=1e-4)
+    told = live_processes.run("connect", file, "--json")
+    assert told.returncode == 0
+    status = json.loads(told.stdout)["status"]
+    assert (status["state"], status["client"]) == ("operation enabled", 0)
+    assert status["position"] == pytest.approx(at + 5e-3, abs=1e-4)
+    refused = live_processes.run("connect", file, "move_to", "7 m")
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert "31" in refused.stderr
+    assert live_processes.run("connect", file, "move_to", "7 V").returncode == 2
+    with detent.connect(file) as axis:  # interrupted while it moves: at rest before it ends
+        axis.do("jog", "50 mm/s", wait=False)
+        ended = running.ended()
+    assert ended["rests"] is True
+    assert ended["state"] == "switch on disabled"
+    assert live_processes.run("connect", file).returncode == 1
+
+
+@in_wall_time
+def test_55_a_second_one_on_the_same_axis_is_refused(folder: Path, running: live_processes.Running) -> None:
+    second = live_processes.run("live", str(folder / "slide.toml"), "--headless", "--for", "0")
+    assert (second.returncode, second.stdout) == (1, "")
+    assert str(running.process.pid) in second.stderr
+    running.end(signal.SIGTERM)
+
+
+@in_wall_time
+def test_18_a_jog_of_a_killed_program_stops_within_its_lease(folder: Path, running: live_processes.Running) -> None:
+    """SIGSTOP: the connection stays, nobody keeps the jog."""
+    script = (
+        "import sys, time, detent\n"
+        "axis = detent.connect(sys.argv[1])\n"
+        "axis.enable(); axis.confirm()\n"
+        "with axis.jog('20 mm/s'):\n"
+        "    print('jogs', flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    file = folder / "slide.toml"
+    program = subprocess.Popen([sys.executable, "-c", script, str(file)], stdout=subprocess.PIPE, text=True)
+    assert program.stdout is not None
+    assert program.stdout.readline() == "jogs\n"
+    with detent.connect(file) as watcher:
+        while watcher.status["rests"]:
+            pass
+        os.kill(program.pid, signal.SIGSTOP)
+        while watcher.status["running"]:
+            pass
+        status = watcher.status
+        while not status["rests"]:
+            status = watcher.status
+        assert status["fault"] is None
+        os.kill(program.pid, signal.SIGKILL)
+        program.communicate()
+        while watcher.status["client"]:  # its right to command ends with it
+            pass
+    running.end()
+
+
+@in_wall_time
+def test_28_a_recorded_session_is_done_again_at_a_desk(folder: Path) -> None:
+    file, log = folder / "slide.toml", folder / "session.jsonl"
+    one = live_processes.Running(file, "--headless", "--no-store", "--period", "10 ms", "--record", str(log))
+    with detent.connect(file) as axis:
+        axis.enable()
+        axis.confirm()
+        axis.move_by("5 mm")
+        with axis.jog("-30 mm/s"):
+            while axis.status["rests"]:
+                pass
+    ended = one.ended()
+    again, _ = make_host(file, wall=False, period=1e-2)
+    repeat(again, Log.read(log.read_text(encoding="ascii").splitlines()), ended["loop"]["periods"])
+    status = Session(again, {}).status()
+    assert {k: v for k, v in status.items() if k != "loop"} == {k: v for k, v in ended.items() if k != "loop"}
+    assert len(again.log.pulled) == 3  # the jog's, and two at the end
+    assert live_processes.run("live", str(file), "--headless", "--for", "0", "--record", str(log)).returncode == 1
+
+
+@in_wall_time
+def test_33_a_killed_process_leaves_a_position_that_is_not_known(folder: Path) -> None:
+    file = folder / "kept.toml"
+    shutil.copy(folder / "slide.toml", file)
+    first = live_processes.Running(file, "--period", "10 ms")
+    assert first.started["trust"] == "referenced"
+    with detent.connect(file) as axis:
+        axis.enable()
+        axis.do("jog", "10 mm/s", wait=False)
+    first.process.kill()
+    first.process.communicate()
+    second = live_processes.Running(file, "--period", "10 ms")
+    assert second.started["trust"] == "unknown"
+    assert "in motion when it was last seen" in second.started["store"]["position"]
+    with detent.connect(file) as axis:
+        axis.do("trust", 2)
+    ended = second.ended()
+    assert ended["trust"] == "referenced"
+    assert ended["store"]["trouble"] == ""
+    told = live_processes.run("live", str(file), "--for", "0")
+    assert told.returncode == 0
+    assert str(file) + ".state" in told.stdout
+    assert f"detent connect {file}" in told.stdout.splitlines()[-4]
+
+
+@in_wall_time
+def test_46_the_position_table_from_a_second_terminal(folder: Path) -> None:
+    file = folder / "places.toml"
+    shutil.copy(folder / "slide.toml", file)
+    live = live_processes.Running(file, "--period", "10 ms")
+    assert "No positions yet" in live_processes.run("connect", str(file), "positions").stdout
+    assert live_processes.run("connect", str(file), "teach", "3").stdout.startswith("3: 20 mm, 4000 counts")
+    assert live_processes.run("connect", str(file), "edit", "load", "0.2 in").returncode == 0
+    table = json.loads(live_processes.run("connect", str(file), "positions", "--json").stdout)["positions"]
+    assert [(row["name"], row["number"], row["counts"]) for row in table] == [("3", 3, 4000), ("load", None, 1016)]
+    assert live_processes.run("connect", str(file), "export", str(folder / "places.csv")).returncode == 0
+    missing = live_processes.run("connect", str(file), "go_to", "lode")
+    assert (missing.returncode, missing.stdout) == (2, "")
+    assert "load" in missing.stderr
+    live.end()
+
+
+@in_wall_time
+def test_47_a_page_sees_rows_of_its_own_channels(panel: PanelRig) -> None:
+    """Two pages, each with channels of its own: columns as the ring holds them."""
+    names = ["position", "controller.law.command"], ["controller.law.limited", "periods"]
+    with panel.browser().socket() as one, panel.browser("viewer").socket() as other:
+        first = [
+            page.ask(do="watch", rate=50, channels=list(c))["watch"]["first"]
+            for page, c in zip((one, other), names, strict=True)
+        ]
+        panel.bench.pass_time(0.2)
+        table = []
+        for page in (one, other):
+            binary = page.until("binary")["binary"]
+            at, n, channels = struct.unpack("<qII", binary[:16])
+            table.append((at, np.frombuffer(binary[16:], "<f4").reshape(channels, n)))
+        assert [at for at, _ in table] >= first
+        at, columns = table[1]
+        assert columns[1].tolist() == [row + 1 for row in range(at, at + columns.shape[1])]
+        text = (
+            panel.browser("viewer")
+            .http.get("/api/scope.csv", params={"channels": "periods,position", "first": at})
+            .text
+        )
+        rows = [line.split(",") for line in text.splitlines()]
+        assert rows[0] == ["row", "periods", "position"]
+        assert [int(row[0]) for row in rows[1:4]] == [at, at + 1, at + 2]
+        ring = panel.bench.host.scope.rows(at)[0]
+        assert [float(row[2]) for row in rows[1:]][: len(ring)] == ring["operation.answer.position"].tolist()
+        assert "nobody watches" in one.ask(do="scope", channels=["lines.motor.count"])["error"]
+        status = one.until("status")
+        assert (status["clients"], status["holder"]) == (3, 0)

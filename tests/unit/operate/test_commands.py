@@ -2,23 +2,19 @@
 
 import asyncio
 import json
-import os
-import shutil
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numba
 import pytest
+from tests.live_processes import Running, live_folder, run
 
 import detent
 from detent.errors import AxisError, DetentError
 from detent.operate.channel import MOST_CLIENTS
 from detent.operate.host import Log, repeat
-from detent.operate.session import Session
 from detent.operate.start import make_host
 from detent.operate.words import CommandError, CommandFailedError, CommandRefusedError
 
@@ -28,116 +24,18 @@ pytestmark = [
 ]
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
     """An axis file, and a folder of its own for channels."""
-    made = tmp_path_factory.mktemp("live")
-    shutil.copy(detent.example("filtered_servo.toml"), made / "slide.toml")
-    made.chmod(0o700)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_RUNTIME_DIR", str(made))
+    with live_folder(tmp_path) as made:
         yield made
 
 
-class Running:
-    """`detent live` in another process."""
-
-    def __init__(self, file: Path, *more: str) -> None:
-        command = [sys.executable, "-m", "detent", "live", str(file), "--json", *more]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        assert self.process.stdout is not None
-        self.started: dict[str, Any] = json.loads(self.process.stdout.readline())
-
-    def end(self, number: int = signal.SIGINT) -> dict[str, Any]:
-        """Interrupt it; what it says at its end."""
-        self.process.send_signal(number)
-        out, err = self.process.communicate(timeout=30)
-        assert self.process.returncode == 0
-        assert all(line.startswith("First run") for line in err.splitlines())
-        return json.loads(out)["ended"]
-
-
 @pytest.fixture
-def running(folder: Path) -> Iterator[Running]:
+def running(folder: Path) -> Running:
     """The axis live."""
     # Other tests want the processors, too.
-    one = Running(folder / "slide.toml", "--headless", "--no-store", "--period", "10 ms")
-    yield one
-    if one.process.poll() is None:
-        one.process.kill()
-        one.process.communicate()
-
-
-def run(*args: str) -> subprocess.CompletedProcess[str]:
-    """A command in another process."""
-    return subprocess.run([sys.executable, "-m", "detent", *args], capture_output=True, text=True, check=False)
-
-
-def test_54_56_an_axis_runs_until_it_is_interrupted_and_others_move_it(folder: Path, running: Running) -> None:
-    file = str(folder / "slide.toml")
-    assert running.started["simulated"] is True
-    assert running.started["state"] == "switch on disabled"
-    assert running.started["period"] == 1e-2
-    with detent.connect(file) as axis:
-        assert axis.about["name"]
-        axis.enable()
-        axis.confirm()
-        at = axis.position
-        axis.move_by("5 mm")
-        assert axis.position == pytest.approx(at + 5e-3, abs=1e-4)
-    told = run("connect", file, "--json")
-    assert told.returncode == 0
-    status = json.loads(told.stdout)["status"]
-    assert (status["state"], status["client"]) == ("operation enabled", 0)
-    assert status["position"] == pytest.approx(at + 5e-3, abs=1e-4)
-    refused = run("connect", file, "move_to", "7 m")
-    assert (refused.returncode, refused.stdout) == (1, "")
-    assert "31" in refused.stderr
-    assert run("connect", file, "move_to", "7 V").returncode == 2
-    with detent.connect(file) as axis:  # interrupted while it moves: at rest before it ends
-        axis.do("jog", "50 mm/s", wait=False)
-        ended = running.end()
-    assert ended["rests"] is True
-    assert ended["state"] == "switch on disabled"
-    assert run("connect", file).returncode == 1
-
-
-def test_55_a_second_one_on_the_same_axis_is_refused(folder: Path, running: Running) -> None:
-    second = run("live", str(folder / "slide.toml"), "--headless", "--for", "0")
-    assert (second.returncode, second.stdout) == (1, "")
-    assert str(running.process.pid) in second.stderr
-    running.end(signal.SIGTERM)
-
-
-def test_18_a_jog_of_a_killed_program_stops_within_its_lease(folder: Path, running: Running) -> None:
-    """SIGSTOP: the connection stays, nobody keeps the jog."""
-    script = (
-        "import sys, time, detent\n"
-        "axis = detent.connect(sys.argv[1])\n"
-        "axis.enable(); axis.confirm()\n"
-        "with axis.jog('20 mm/s'):\n"
-        "    print('jogs', flush=True)\n"
-        "    time.sleep(60)\n"
-    )
-    file = folder / "slide.toml"
-    program = subprocess.Popen([sys.executable, "-c", script, str(file)], stdout=subprocess.PIPE, text=True)
-    assert program.stdout is not None
-    assert program.stdout.readline() == "jogs\n"
-    with detent.connect(file) as watcher:
-        while watcher.status["rests"]:
-            pass
-        os.kill(program.pid, signal.SIGSTOP)
-        while watcher.status["running"]:
-            pass
-        status = watcher.status
-        while not status["rests"]:
-            status = watcher.status
-        assert status["fault"] is None
-        os.kill(program.pid, signal.SIGKILL)
-        program.communicate()
-        while watcher.status["client"]:  # its right to command ends with it
-            pass
-    running.end()
+    return Running(folder / "slide.toml", "--headless", "--no-store", "--period", "10 ms")
 
 
 def test_the_words_of_the_api_block_and_can_be_awaited(folder: Path) -> None:
@@ -213,7 +111,7 @@ def test_faults_are_injected_and_read_from_a_second_terminal(folder: Path, runni
     assert "F02" in told.stdout
     (fault,) = json.loads(run("connect", file, "faults", "--json").stdout)["faults"]
     assert fault["code"] == "F02"
-    running.end()
+    running.ended()
 
 
 @pytest.mark.parametrize("value", [None, True, "5", "5 V", "x", [1], {}, "nan mm"])
@@ -257,26 +155,7 @@ def test_a_client_too_many_is_told(folder: Path, running: Running) -> None:
             continue
     for one in others[1:]:
         one.close()
-    running.end()
-
-
-def test_28_a_recorded_session_is_done_again_at_a_desk(folder: Path) -> None:
-    file, log = folder / "slide.toml", folder / "session.jsonl"
-    one = Running(file, "--headless", "--no-store", "--period", "10 ms", "--record", str(log))
-    with detent.connect(file) as axis:
-        axis.enable()
-        axis.confirm()
-        axis.move_by("5 mm")
-        with axis.jog("-30 mm/s"):
-            while axis.status["rests"]:
-                pass
-    ended = one.end()
-    again, _ = make_host(file, wall=False, period=1e-2)
-    repeat(again, Log.read(log.read_text(encoding="ascii").splitlines()), ended["loop"]["periods"])
-    status = Session(again, {}).status()
-    assert {k: v for k, v in status.items() if k != "loop"} == {k: v for k, v in ended.items() if k != "loop"}
-    assert len(again.log.pulled) == 3  # the jog's, and two at the end
-    assert run("live", str(file), "--headless", "--for", "0", "--record", str(log)).returncode == 1
+    running.ended()
 
 
 def test_a_log_in_wall_time_holds_the_last_requests(folder: Path) -> None:
@@ -334,48 +213,8 @@ def test_an_axis_that_nobody_runs_is_told(folder: Path) -> None:
         detent.connect(folder / "nobody.toml")
 
 
-def test_33_a_killed_process_leaves_a_position_that_is_not_known(folder: Path) -> None:
-    file = folder / "kept.toml"
-    shutil.copy(folder / "slide.toml", file)
-    first = Running(file, "--period", "10 ms")
-    assert first.started["trust"] == "referenced"
-    with detent.connect(file) as axis:
-        axis.enable()
-        axis.do("jog", "10 mm/s", wait=False)
-    first.process.kill()
-    first.process.communicate()
-    second = Running(file, "--period", "10 ms")
-    assert second.started["trust"] == "unknown"
-    assert "in motion when it was last seen" in second.started["store"]["position"]
-    with detent.connect(file) as axis:
-        axis.do("trust", 2)
-    ended = second.end()
-    assert ended["trust"] == "referenced"
-    assert ended["store"]["trouble"] == ""
-    told = run("live", str(file), "--for", "0")
-    assert told.returncode == 0
-    assert str(file) + ".state" in told.stdout
-    assert f"detent connect {file}" in told.stdout.splitlines()[-4]
-
-
-def test_46_the_position_table_from_a_second_terminal(folder: Path) -> None:
-    file = folder / "places.toml"
-    shutil.copy(folder / "slide.toml", file)
-    live = Running(file, "--period", "10 ms")
-    assert "No positions yet" in run("connect", str(file), "positions").stdout
-    assert run("connect", str(file), "teach", "3").stdout.startswith("3: 20 mm, 4000 counts")
-    assert run("connect", str(file), "edit", "load", "0.2 in").returncode == 0
-    table = json.loads(run("connect", str(file), "positions", "--json").stdout)["positions"]
-    assert [(row["name"], row["number"], row["counts"]) for row in table] == [("3", 3, 4000), ("load", None, 1016)]
-    assert run("connect", str(file), "export", str(folder / "places.csv")).returncode == 0
-    missing = run("connect", str(file), "go_to", "lode")
-    assert (missing.returncode, missing.stdout) == (2, "")
-    assert "load" in missing.stderr
-    live.end()
-
-
 def test_signals_that_come_all_at_once_end_it(running: Running) -> None:
     """A second Ctrl-C while the first was heeded waited for itself for ever, and the axis stayed live."""
     for number in (signal.SIGINT, signal.SIGTERM) * 50:
         running.process.send_signal(number)
-    assert running.end()["state"] == "switch on disabled"
+    assert running.ended()["state"] == "switch on disabled"

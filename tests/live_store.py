@@ -1,4 +1,4 @@
-"""Live specification, section 8, tests 33 to 36: what survives a kill, a power cut, an edit, a push by hand."""
+"""Rigs of live tests 33 to 36: kills counted, every disk that a power cut leaves, axis files that were edited."""
 
 import _sqlite3
 import json
@@ -6,25 +6,20 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.live_rig import SENSORS, memory_folder, open_store, read, table_of
-from tests.power_cut import RecordingDisk, images
 
 from detent.methods.load import load_spec
-from detent.methods.position import Sensed
 from detent.methods.registry import METHODS
-from detent.operate.opening import meanings, store_path
+from detent.operate.opening import meanings
 from detent.operate.store import Store
 from detent.operate.trust import Trust, Why
+from tests.live_rig import SENSORS, memory_folder, open_store, read, table_of
+from tests.places import ROOT
+from tests.power_cut import RecordingDisk, images
 
-ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES = ROOT / "src" / "detent" / "examples"
 RANK = {Trust.UNKNOWN: 0, Trust.RESTORED: 1, Trust.REFERENCED: 2}
-
-# ---- 33: kills
 
 
 def kill(kills: int) -> Counter[str]:
@@ -46,23 +41,6 @@ def check_kills(told: Counter[str]) -> None:
     assert told["changes"] > 0.3 * told["kills"]
     for why in (Why.PARKED, Why.READ, Why.UNIQUE, Why.KILLED, Why.NOT_HELD, Why.AMBIGUOUS, Why.MOVED, Why.UNREFERENCED):
         assert told[why.name] > 0, why
-
-
-@pytest.mark.wide
-@pytest.mark.skipif(sys.platform == "win32", reason="processes are forked")
-def test_33_no_wrong_position_and_no_lost_row_after_a_thousand_kills(tried):
-    told = kill(1000)
-    check_kills(told)
-    tried("store", "host killed while it wrote and moved", "no wrong position taken, no change lost", told["kills"])
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform == "win32", reason="processes are forked")
-def test_33_no_wrong_position_and_no_lost_row_after_fifty_thousand_kills():
-    check_kills(kill(50_000))
-
-
-# ---- 34: power cuts
 
 
 def protocol(store: Store, name: str) -> Iterator[tuple[str, int | None]]:
@@ -160,37 +138,6 @@ needs_library = pytest.mark.skipif(
 )
 
 
-@needs_library
-def test_34_a_power_cut_at_every_sync_leaves_old_or_new():
-    with memory_folder() as folder:
-        told = cut_everywhere("incremental, held", 0, folder)
-    assert told["cuts"] > 150
-    assert min(told["old"], told["new"], told[Trust.UNKNOWN], told[Trust.RESTORED]) > 5
-
-
-@needs_library
-@pytest.mark.parametrize("synchronous", ["OFF", "NORMAL"])
-def test_34_a_protocol_that_syncs_less_is_found_out(synchronous):
-    with memory_folder() as folder, pytest.raises(AssertionError):
-        cut_everywhere("incremental, held", 4, folder, synchronous)
-
-
-@needs_library
-@pytest.mark.wide
-@pytest.mark.parametrize("name", ["incremental, held", "absolute", "band, held", "circle"])
-def test_34_a_power_cut_with_writes_torn_and_lost_leaves_old_or_new(name, tried):
-    with memory_folder() as folder:
-        told = cut_everywhere(name, 8, folder)
-    assert told["disks"] > 1000
-    assert min(told["old"], told[Trust.UNKNOWN], told[Trust.RESTORED]) > 300
-    # A change is new before it is told to be made only while its journal is being cut off.
-    assert told["new"] > 5
-    tried("store", "power cut, writes lost and torn", "old or new, never more trusted", told["disks"])
-
-
-# ---- 35: the axis file
-
-
 def taught_store(path: Path, made) -> None:
     with open_store(path, made) as store:
         store.refer(1000, "index", read(made, 1000, 77))
@@ -209,62 +156,6 @@ EDITS = {
 }
 
 
-@pytest.mark.parametrize("edit", EDITS)
-def test_35_a_store_of_another_axis_is_kept_aside_and_both_are_shown(tmp_path, edit):
-    made, path = SENSORS["absolute"], tmp_path / "axis.toml.state"
-    taught_store(path, made)
-    before, other = path.read_bytes(), replace(made, **EDITS[edit])
-    with open_store(path, other) as store:
-        assert store.restore(4923) == store.standing
-        assert store.standing.why is Why.NEW
-        assert store.positions == {}
-        aside = store.aside
-        assert aside is not None
-        assert aside.path.read_bytes() == before
-        names = {name: pair for name, pair in aside.differs.items() if not (edit == "scale" and name == "travel")}
-        expected = {"scale": "scale", "origin": "scale", "travel": "travel"}.get(edit, "sensor")
-        assert names == {expected: (meanings(made)[expected], meanings(other)[expected])}
-        assert all(text in str(aside) for pair in aside.differs.values() for text in pair)
-        assert [one.counts for one in aside.positions] == [5000]
-    # What was kept aside is still the store of the axis that it was made for.
-    aside.path.rename(path)
-    with open_store(path, made) as store:
-        assert store.aside is None
-        assert store.restore(4923).counts == 5000
-
-
-def test_35_an_edit_of_gains_keeps_the_position(tmp_path):
-    file = EXAMPLES / "cascade.toml"
-    before = sensors_of(file)
-    assert sensors_of(file, "method.position_gain=31", "limits.speed=0.1 m/s") == before
-    other = {"encoder.resolution=3 um": "scale", "limits.travel=0.71 m": "travel"}
-    for override, name in other.items():
-        after = sensors_of(file, override)
-        assert [key for key in before if before[key] != after[key]] == [name]
-    assert store_path(tmp_path / file.name).name == "cascade.toml.state"
-
-
 def sensors_of(file: Path, *overrides: str) -> dict[str, str]:
     spec = load_spec(file, overrides)
     return meanings(METHODS[spec.axis.method].sensors(spec)[""])
-
-
-# ---- 36: moved while off
-
-
-@pytest.mark.parametrize("name", [name for name, made in SENSORS.items() if made.kind is not Sensed.INCREMENTAL])
-@pytest.mark.parametrize("moved", [6, -6, 700, -1500])
-def test_36_an_axis_that_was_moved_while_off_is_not_restored_and_the_distance_is_shown(tmp_path, name, moved):
-    made, path = SENSORS[name], tmp_path / "axis.state"
-    taught_store(path, made)
-    with open_store(path, made) as store:
-        assert store.restore(read(made, 5000, 77)).trust is (Trust.UNKNOWN if name == "band" else Trust.RESTORED)
-        assert store.restore(read(made, 5000 + made.window, 77)).distance == made.window
-        judged = store.restore(read(made, 5000 + moved, 77))
-        assert (judged.trust, judged.counts) == (Trust.UNKNOWN, None)
-        assert (judged.shown, judged.distance) == (5000 + moved, moved)
-        assert judged.why is (Why.AMBIGUOUS if name == "band" else Why.MOVED)
-        assert f"{moved} um" in judged.describe(made) or f"{moved / 1000} mm" in judged.describe(made)
-        if name != "band":
-            assert store.confirm().counts == 5000 + moved
-            assert store.trust is Trust.RESTORED

@@ -1,0 +1,162 @@
+"""`detent live` in processes of its own, with people who watch, flood, and stay for long."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import detent
+from tests.live_panel import Browser, Socket
+
+STARTED: list[subprocess.Popen[str]] = []  # also by a test that fails
+
+
+class Live:
+    """`detent live` on a file."""
+
+    def __init__(self, file: Path, *more: str) -> None:
+        self.file = file
+        command = [sys.executable, "-m", "detent", "live", str(file), *more]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        STARTED.append(self.process)
+        assert self.process.stdout is not None
+        self.out = self.process.stdout
+
+    def panel_id(self) -> int:
+        """Process of the panel."""
+        found = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text(encoding="ascii").split()
+        panels = [pid for pid in found if "detent.panel" in Path(f"/proc/{pid}/cmdline").read_text(encoding="utf-8")]
+        return int(panels[0])
+
+    def end(self, number: int = signal.SIGINT) -> str:
+        """Interrupt it; what it says at its end."""
+        self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=30)
+        assert self.process.returncode == 0
+        assert all(line.startswith("First run") for line in err.splitlines()), err
+        return out
+
+
+class Running(Live):
+    """The same in words for programs."""
+
+    def __init__(self, file: Path, *more: str) -> None:
+        super().__init__(file, "--json", *more)
+        self.started: dict[str, Any] = json.loads(self.out.readline())
+
+    def ended(self, number: int = signal.SIGINT) -> dict[str, Any]:
+        """Interrupt it; how it ended."""
+        return json.loads(self.end(number))["ended"]
+
+
+@contextmanager
+def live_folder(folder: Path) -> Iterator[Path]:
+    """A folder with an axis file, slide.toml, and for channels; nothing that was started there stays."""
+    shutil.copy(detent.example("filtered_servo.toml"), folder / "slide.toml")
+    folder.chmod(0o700)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        yield folder
+    while STARTED:
+        one = STARTED.pop()
+        if one.poll() is None:
+            one.kill()
+            one.communicate()
+
+
+def entered(link: str) -> Browser:
+    """Follow a link."""
+    base = link.partition("/enter")[0]
+    browser = Browser(base, "", {})
+    assert browser.http.get(link).status_code == 303
+    return browser
+
+
+def flooded(browser: Any, cookies: str, kind: str, socket: Socket, watcher: Any) -> tuple[float, float]:
+    """Stops beside a flood."""
+    flood = subprocess.Popen(
+        [sys.executable, "-m", "tests.live_flood", browser.base, cookies, browser.form_mark(), kind],
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert flood.stdout is not None
+    assert flood.stdout.readline() == "floods\n"
+    found = stops(socket, watcher)
+    told = json.loads(flood.communicate(timeout=60)[0])
+    assert told["sent"] >= (1000 if kind == "malformed" else 5_000)
+    return found
+
+
+def stops(socket: Socket, watcher: Any) -> tuple[float, float]:
+    """Stops for two seconds: the time in which 99 of 100 were answered [s], and the share of periods skipped."""
+    taken: list[float] = []
+    before, begin = watcher.status["loop"], time.monotonic()
+    while time.monotonic() - begin < 2.0:
+        at = time.perf_counter()
+        assert "id" in socket.ask(do="stop")
+        taken.append(time.perf_counter() - at)
+        threading.Event().wait(0.005)
+    after = watcher.status["loop"]
+    share = (after["skipped"] - before["skipped"]) / max(1, after["periods"] - before["periods"])
+    return float(np.quantile(taken, 0.99)), share
+
+
+def resident(*processes: int) -> int:
+    """Memory that processes hold [bytes]."""
+    pages = [int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]) for pid in processes]
+    return sum(pages) * os.sysconf("SC_PAGE_SIZE")
+
+
+def soak(folder: Path, warm: float, seconds: float) -> dict[str, float]:
+    """Jogs, moves, a page with eight channels, and others that come and go; growth of memory after `warm` [1]."""
+    live = Live(folder, "--period", "10 ms", "--json")
+    browser, left = entered(json.loads(live.out.readline())["panel"][0]), threading.Event()
+    processes, held, rounds, begin = (live.process.pid, live.panel_id()), 0, 0, time.monotonic()
+    with browser.socket() as socket, browser.socket() as page, detent.connect(live.file) as axis:
+        names = [one["name"] for one in axis.about["channels"] if one["name"] != "periods"][:8]
+        page.ask(do="watch", rate=25, channels=names)
+
+        def read() -> None:
+            while not left.is_set():
+                page.until("status")
+
+        reader = threading.Thread(target=read)
+        reader.start()
+        for word in ("take", "enable", "confirm"):
+            socket.ask(do=word)
+        while (passed := time.monotonic() - begin) < warm + seconds:
+            socket.ask(do="jog", value="20 mm/s" if rounds % 2 else "-20 mm/s")
+            for _ in range(10):
+                left.wait(0.05)
+                socket.ask(do="keep")
+            socket.ask(do="stop")
+            socket.ask(do="move_to", value="30 mm")
+            assert browser.http.get("/").status_code == 200
+            with detent.connect(live.file) as other:
+                assert other.status["fault"] is None
+            rounds += 1
+            held = held or (resident(*processes) if passed > warm else 0)
+        grown = resident(*processes) / held - 1.0
+        left.set()
+        reader.join()
+        status = axis.status
+    browser.http.close()
+    live.end()
+    assert live.process.returncode == 0
+    return {"grown": grown, "fault": status["fault"], "rounds": rounds, "skipped": status["loop"]["skipped"],
+            "periods": status["loop"]["periods"]}  # fmt: skip
+
+
+def run(*args: str) -> subprocess.CompletedProcess[str]:
+    """A command in another process."""
+    return subprocess.run([sys.executable, "-m", "detent", *args], capture_output=True, text=True, check=False)
