@@ -141,6 +141,8 @@ class Channel:
             with suppress(BlockingIOError):  # the lease of a jog runs out by itself
                 self.session.ask("leave", client=client.number)
             writer.close()
+            with suppress(OSError, asyncio.CancelledError):  # else asyncio tells of a killed client by a traceback
+                await writer.wait_closed()
 
     def _answer(self, line: bytes, client: Client) -> dict[str, Any]:
         """What a message is answered."""
