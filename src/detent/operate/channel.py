@@ -32,6 +32,7 @@ LONGEST = 1 << 16  # bytes of a message
 MOST_CLIENTS = 32
 MOST_WAITING = 1 << 20  # bytes that a client has not read until it is dropped
 SLOW = 1 << 16  # bytes that it has not read until it is sent no rows
+LEAVING = 0.5  # for what is still to be sent to a client that leaves [s]
 LOOK = 2e-3  # how often endings are looked for [s]
 UNTOLD = {"keep"}  # twenty a second: of the jog that they keep there is a record
 RATES = 1.0, 50.0  # of a watch [Hz]
@@ -112,8 +113,11 @@ class Channel:
         self._ready.set()
         await self._left.wait()
         server.close()
-        for task in asyncio.all_tasks() - {asyncio.current_task()}:
+        others = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in others:
             task.cancel()
+        if others:  # who reads nothing is not waited for
+            await asyncio.wait(others, timeout=2 * LEAVING)
 
     async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One client, until it leaves."""
@@ -141,8 +145,10 @@ class Channel:
             with suppress(BlockingIOError):  # the lease of a jog runs out by itself
                 self.session.ask("leave", client=client.number)
             writer.close()
-            with suppress(OSError, asyncio.CancelledError):  # else asyncio tells of a killed client by a traceback
-                await writer.wait_closed()
+            try:  # the end of a killed client is an error, which asyncio tells where nobody asks for it
+                await asyncio.wait_for(writer.wait_closed(), LEAVING)
+            except (OSError, TimeoutError, asyncio.CancelledError):
+                writer.transport.abort()
 
     def _answer(self, line: bytes, client: Client) -> dict[str, Any]:
         """What a message is answered."""

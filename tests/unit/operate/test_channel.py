@@ -1,7 +1,9 @@
 """The channel's side of a message: whatever comes, an answer goes."""
 
+import gc
 import json
 import math
+import socket
 from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -76,6 +78,27 @@ def test_a_client_that_does_not_read_is_dropped() -> None:
     writer: Any = SimpleNamespace(is_closing=lambda: False, transport=transport)
     assert not module._send(writer, {"status": {}})
     assert dropped == [True]
+
+
+def test_killed_clients_left_a_traceback_on_the_terminal(
+    channel: Channel, tmp_path: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Who is killed with answers unread resets the connection; asyncio told of it when the axis ended."""
+    listening = Channel(channel.session, tmp_path / "axis.sock")
+    listening.start()
+    for _ in range(3):
+        with socket.socket(socket.AF_UNIX) as client:
+            client.connect(str(listening.path))
+            client.sendall(b'{"do": "status"}\n')
+            assert client.recv(1)  # the rest of the answer stays unread
+    stays = socket.socket(socket.AF_UNIX)
+    stays.connect(str(listening.path))
+    stays.sendall(b'{"do": "describe"}\n' * 100)  # and reads nothing at all
+    assert stays.recv(1)
+    listening.close()
+    stays.close()
+    gc.collect()
+    assert [record.getMessage() for record in caplog.records] == []
 
 
 def test_channels_of_several_clients_share_eight_places(channel: Channel) -> None:
