@@ -112,8 +112,11 @@ class Channel:
         self._ready.set()
         await self._left.wait()
         server.close()
-        for task in asyncio.all_tasks() - {asyncio.current_task()}:
-            task.cancel()
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        while tasks:  # one that is cancelled still closes its socket; a client that does not read makes that long
+            for task in tasks:
+                task.cancel()
+            _, tasks = await asyncio.wait(tasks, timeout=0.2)
 
     async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One client, until it leaves."""
