@@ -1,5 +1,6 @@
 """`detent live` and `detent connect`: an axis under somebody's hand."""
 
+import contextlib
 import json
 import os
 import select
@@ -8,13 +9,13 @@ import signal
 import sys
 import threading
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from detent.cli.app import NOT_DONE, Json, Set, app, option
+from detent.cli.app import DONE, NOT_DONE, Json, Set, app, option
 from detent.cli.terminal import print_json, tell
 from detent.errors import DetentError
 from detent.units import format_quantity
@@ -62,9 +63,6 @@ def live(
     as_json: Json = False,
 ) -> None:
     """Run an axis live, in wall time, until Ctrl-C: it then comes to rest in a ramp and lets go."""
-    from detent.methods.load import read_axis
-    from detent.operate.audit import Audit
-    from detent.operate.channel import channel_of
     from detent.operate.client import LiveAxis
     from detent.operate.session import Session
     from detent.operate.start import Place, beside, make_host, shared_memory
@@ -73,54 +71,59 @@ def live(
 
     at = PanelPlace(bind, port, certificate, key_file, plain, names or ())
     at.check()
-    place, where, (board, memory) = Place(file), None if no_store else store or beside(file), shared_memory()
-    read = read_axis(file, overrides or [])
-    host, name = make_host(
-        file,
-        overrides or [],
-        motor=motor,
-        speed=speed,
-        period=_seconds(period),
-        store=where,
-        memory=memory,
-        drive=drive,
-    )
-    recorder = _record(host, record) if record else None
-    missing, left, watchdog = host.start(), Ending(), Watchdog(host.board, board)
-    about = {"name": name, "file": str(file), "simulated": host.link is None, "speed": speed}
-    session = Session(host, about, _axis_file(read))
-    status = session.status()
-    audit = Audit(Path(status["store"]["path"] if status["store"] else channel_of(file)).with_suffix(".audit"))
-    channel = place.serve(session, audit)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, left.ask)
-    panel = None if headless else Child(channel.path, at)
-    links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
-    told = session.describe()
-    started = about | {
-        "channel": str(channel.path), "not_permitted": missing, "state": host.state, "period": told["period"],
-        "panel": links, "store": status["store"], "unit": session.unit, "watchdog": watchdog.id, "drive": told["drive"],
-        "hardware": host.link.driver.hardware if host.link else "",
-    } | {key: status[key] for key in ("position", "trust", "find")}  # fmt: skip
-    if as_json:
-        print(json.dumps(started), flush=True)
-    else:
-        _tell_start(file, started)
-    while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
-        if panel and (told := panel.mend()) and not as_json:
-            tell(told)
-        if watchdog.keep() and not as_json:
-            tell("The watchdog had ended; another one watches now.")
-    died = not host.is_alive
-    LiveAxis(session).close()
-    host.note()  # the pulls of its end belong to the log
-    for one in filter(None, (panel, channel, audit, recorder, watchdog)):
-        one.close()
-    place.leave()
+    with ExitStack() as closing:
+        place, where, (board, memory) = Place(file), None if no_store else store or beside(file), shared_memory()
+        closing.callback(place.leave)
+        host, name = make_host(
+            file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where, memory=memory,
+            drive=drive,
+        )  # fmt: skip
+        if record:
+            closing.callback(_record(host, record).close)
+        missing, left = host.start(), Ending()
+        closing.callback(lambda: host.is_running and host.close())  # where what follows cannot begin
+        watchdog = closing.enter_context(contextlib.closing(Watchdog(host.board, board)))
+        about = {"name": name, "file": str(file), "simulated": host.link is None, "speed": speed}
+        session = Session(host, about, _axis_file(file, overrides or []))
+        channel = _serve(closing, place, session)
+        left.hear()
+        panel = None if headless else closing.enter_context(contextlib.closing(Child(channel.path, at)))
+        links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
+        more = {"channel": str(channel.path), "not_permitted": missing, "panel": links, "watchdog": watchdog.id}
+        _tell_start(file, _started(session) | more, as_json=as_json)
+        while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
+            _mend(panel, watchdog, quiet=as_json)
+        status = NOT_DONE if not host.is_alive else DONE
+        LiveAxis(session).close()
+        host.note()  # the pulls of its end belong to the log
     _tell_end(session, as_json=as_json)
-    if died:
-        raise typer.Exit(NOT_DONE)
+    raise typer.Exit(status)
+
+
+def _serve(closing: ExitStack, place: Any, session: Any) -> Any:
+    """Let other programs ask; what they ask is written down beside the store, or the channel. Gives the channel."""
+    from detent.operate.audit import Audit
+
+    store = session.status()["store"]
+    path = Path(store["path"]) if store else place.channel
+    audit = closing.enter_context(contextlib.closing(Audit(path.with_suffix(".audit"))))
+    return closing.enter_context(contextlib.closing(place.serve(session, audit)))
+
+
+def _started(session: Any) -> dict[str, Any]:
+    """How it is at the beginning."""
+    status, told, link = session.status(), session.describe(), session.host.link
+    found = {key: told[key] for key in ("name", "file", "simulated", "speed", "unit", "period", "drive")}
+    found |= {key: status[key] for key in ("state", "store", "position", "trust", "find")}
+    return found | {"hardware": link.driver.hardware if link else ""}
+
+
+def _mend(panel: Any, watchdog: Any, *, quiet: bool) -> None:
+    """Start again what has died beside the loop."""
+    told = [panel.mend()] if panel else []
+    told += ["The watchdog had ended; another one watches now."] if watchdog.keep() else []
+    for one in filter(None, () if quiet else told):
+        tell(one)
 
 
 class Ending:
@@ -129,6 +132,11 @@ class Ending:
     def __init__(self) -> None:
         self._hears, self._tells = os.pipe()
         os.set_blocking(self._tells, False)
+
+    def hear(self) -> None:
+        """Heed Ctrl-C and `kill` from now on."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self.ask)
 
     def ask(self, _number: int, _frame: object) -> None:
         """Ask for it; a lock would wait for whoever was interrupted, for ever."""
@@ -162,10 +170,12 @@ def _record(host: Any, path: Path) -> Any:
     return recorder
 
 
-def _axis_file(read: Any) -> dict[str, Any]:
+def _axis_file(file: Path, overrides: list[str]) -> dict[str, Any]:
     """Text of an axis file, and every effective value with its origin."""
     from detent.methods.check import check_spec
+    from detent.methods.load import read_axis
 
+    read = read_axis(file, overrides)
     rows = [[row.key, row.value, row.origin, row.doc] for row in check_spec(read).rows]
     return {"file": read.file, "text": read.source.content.decode(errors="replace"), "effective": rows}
 
@@ -180,8 +190,11 @@ def _seconds(period: str) -> float:
         raise DetentError(f"--period {period}: {error}") from error
 
 
-def _tell_start(file: Path, started: dict[str, Any]) -> None:
+def _tell_start(file: Path, started: dict[str, Any], *, as_json: bool) -> None:
     """What is running, and how to speak to it."""
+    if as_json:
+        print(json.dumps(started), flush=True)
+        return
     name = shlex.quote(str(file))
     speed = "" if started["speed"] == 1.0 else f", time {started['speed']:g} times as fast"
     what = "SIMULATION" if started["simulated"] else f"on {started['hardware']}"
@@ -232,27 +245,28 @@ def connect(
     if word == "link":
         tell(link_of(keys_of(channel_of(file)), value or "engineer", time.time()))
         return
-    axis = connect_to(file)
-    ended: dict[str, Any] = {}
-    if word == "jog":
-        if value is None:
-            raise DetentError('connect: a jog needs a velocity such as "20 mm/s"')
-        with axis.jog(value):
-            threading.Event().wait(seconds)
-    elif word not in ("status", "positions", "faults"):
-        ended = axis.do(word, _about(word, value, second), speed, wait=False).wait().to_dict()
-    if word in ("positions", *PLACES):
-        _show_positions(axis.positions, axis.unit, as_json=as_json)
-        return
-    status, faults = axis.status, axis.faults if word == "faults" else []
+    with connect_to(file) as axis:
+        ended: dict[str, Any] = {}
+        if word == "jog":
+            if value is None:
+                raise DetentError('connect: a jog needs a velocity such as "20 mm/s"')
+            with axis.jog(value):
+                threading.Event().wait(seconds)
+        elif word not in ("status", "positions", "faults"):
+            ended = axis.do(word, _about(word, value, second), speed, wait=False).wait().to_dict()
+        if word in ("positions", *PLACES):
+            _show_positions(axis.positions, axis.unit, as_json=as_json)
+            return
+        status, faults = axis.status, axis.faults if word == "faults" else []
+        why = axis.why_not_moving
     if as_json:
         found = {"faults": faults} if word == "faults" else {}
-        print_json({"status": status, "ended": ended, "why_not_moving": axis.why_not_moving} | found)
+        print_json({"status": status, "ended": ended, "why_not_moving": why} | found)
         return
     for one in faults:
         tell(describe_fault(one))
     tell(describe_status(status, axis.unit))
-    for what, remedy in axis.why_not_moving:
+    for what, remedy in why:
         tell(f"  not moving: {what}; {remedy}")
 
 

@@ -2,7 +2,8 @@
 
 It stands between those who ask (a panel, a program, a fieldbus; they write `Request`) and the controller of a method,
 which is told by `Demand` what to do and says by `Answer` how it is. It is a step of the controller: it knows neither
-who sits at the other end of the wires nor what time it is, only looks.
+who sits at the other end of the wires nor what time it is, only looks. `commands` takes what is asked, `move_commands`
+the part of it that moves the axis.
 
 A command has an id and ends exactly once: done, aborted by another, refused, or failed. Done means: inside the window
 for the window's time while the commanded point rests; a move of no length takes that time, too. Stop and off are
@@ -11,21 +12,15 @@ taken in every state, from everybody. A stop raises the epoch: what was asked be
 
 from detent.control.axis_states import (
     DISABLE_VOLTAGE,
-    ENABLE_OPERATION,
     ENABLED,
     FAULT,
     FAULT_REACTION,
-    HALT_QUICKLY,
     NOT_READY,
     QUICK_STOP,
-    RESET_FAULT,
-    SHUTDOWN,
-    SWITCH_ON,
     SWITCH_ON_DISABLED,
     ordered,
 )
 from detent.control.reaction import LETS_GO, LOSES, is_among
-from detent.kernel.compiled import bits_of
 from detent.kernel.registers import Registers, block, f8, i2_array, i8, i8_array, register, u1, u1_array, u2
 from detent.kernel.step import hot_step, step
 
@@ -54,8 +49,6 @@ NOT_KNOWN, RESTORED, REFERENCED = range(3)
 
 # ---- what the method's controller is told to do
 REST_OFF, HOLD, TRAVEL, RUN, HALT, SEEK, NUMBERED, WORK = range(8)
-
-SUM = (1 << 62) - 1
 
 ENDS = 256  # endings that are kept until the host has read them
 
@@ -261,233 +254,6 @@ def lose_torque(o: Operation, code: int) -> None:
         fail(o, code)
 
 
-# ---------------------------------------------------------------------------------------------------- what is asked
-
-
-@step
-def why_not(q: OperationParams, o: Operation, r: Request) -> int:
-    """Reason to refuse a request, 0 for none; stop and off are never refused."""
-    if not (1 <= r.kind <= UPPER) or r.id < NEEDS_ID:
-        return UNKNOWN
-    if not (abs(r.value) < 1e12 and 0.0 < r.speed <= 1.0):  # neither infinite nor no number
-        return NOT_FINITE
-    if (q.takes >> r.kind & 1) == 0:
-        return NOT_OFFERED
-    if r.epoch != o.epoch:
-        return STALE
-    if o.client not in (0, r.client) and r.kind != TAKE:
-        return SECOND
-    if r.kind == LEAVE:
-        return 0
-    if r.kind == RESET:
-        return 0 if o.state == FAULT else NO_FAULT
-    return IN_FAULT if o.state in (FAULT, FAULT_REACTION) else why_not_now(q, o, r)
-
-
-@step
-def why_not_now(q: OperationParams, o: Operation, r: Request) -> int:
-    """Reason to refuse a request of an axis without a fault, 0 for none."""
-    if r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, CONFIRM, JOB):
-        return why_not_move(q, o, r)
-    if r.kind in (LOWER, UPPER):
-        return 0 if can_move_end(q, o, r) else BEYOND
-    if r.kind == FEED:
-        return 0 if o.kind == JOB else NO_JOB
-    if r.kind == TRUST and o.state == ENABLED:
-        return MOVING
-    if r.kind == ENABLE:
-        return o.barred or (UNREADY if o.answer.ready == 0 else 0)
-    return 0
-
-
-@hot_step
-def can_move_end(q: OperationParams, o: Operation, r: Request) -> bool:
-    """An end moves between the limit of the file and the other end."""
-    if r.kind == LOWER:
-        return q.lowest <= r.value < upper_end(q, o)
-    return lower_end(q, o) < r.value <= q.highest
-
-
-@step
-def why_not_move(q: OperationParams, o: Operation, r: Request) -> int:
-    """Reason to refuse a motion."""
-    if o.state != ENABLED:
-        return NOT_ENABLED
-    if q.one_at_a_time and o.running and r.kind != CONFIRM:
-        return BUSY
-    if o.trust == NOT_KNOWN and r.kind in (MOVE_TO, GO, JOB):
-        return UNREFERENCED
-    if r.kind == JOB and q.careful and not o.confirmed:  # it goes at speeds of its own
-        return NOT_CONFIRMED
-    if r.kind in (MOVE_TO, MOVE_BY) and not is_allowed(q, o, goal(o, r)):
-        return BEYOND
-    return 0
-
-
-@hot_step
-def goal(o: Operation, r: Request) -> float:
-    """Where a move ends; by a way, from where the commanded point is."""
-    return r.value if r.kind == MOVE_TO else o.answer.commanded + r.value
-
-
-@hot_step
-def lower_end(q: OperationParams, o: Operation) -> float:
-    """Lower soft limit, or where a hand has moved it since."""
-    return o.demand.lowest if o.demand.moved & 1 else q.lowest
-
-
-@hot_step
-def upper_end(q: OperationParams, o: Operation) -> float:
-    """Upper soft limit, or where a hand has moved it since."""
-    return o.demand.highest if o.demand.moved & 2 else q.highest
-
-
-@hot_step
-def is_allowed(q: OperationParams, o: Operation, target: float) -> bool:
-    """A target between the ends, or nearer to them than the axis is; without a reference they mean nothing."""
-    lowest, highest, here = lower_end(q, o), upper_end(q, o), o.answer.commanded
-    if q.endless or o.trust == NOT_KNOWN or lowest <= target <= highest:
-        return True
-    return here < target < lowest or highest < target < here
-
-
-@step
-def obey(q: OperationParams, o: Operation, r: Request) -> None:
-    """Take one request."""
-    o.taken += 1
-    if r.kind == STOP:
-        stop(o, r.id)
-        o.running, o.kind = r.id, STOP  # done at rest
-        return
-    if r.kind == OFF:
-        off(o, r.id)
-        end(o, r.id, DONE, 0, 0)
-        return
-    why = why_not(q, o, r)
-    if why:
-        end(o, r.id, REFUSED, why, 0)
-    elif r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, JOB):
-        begin_motion(q, o, r)
-    else:
-        manage(q, o, r)
-        end(o, r.id, DONE, 0, 0)
-
-
-@step
-def begin_motion(q: OperationParams, o: Operation, r: Request) -> None:
-    """A motion takes the place of the one under way; a jog that is asked again goes on, at another velocity."""
-    if not (r.kind == JOG and o.kind == JOG and o.running == r.id):
-        end_running(o, ABORTED, 0, r.id)
-    o.client, o.running, o.kind = r.client, r.id, r.kind
-    o.within = o.outside = o.halted = 0
-    d = o.demand
-    d.share = allowed_share(q, o, r.speed)
-    if r.kind == JOG:
-        o.lease = q.lease_looks
-        d.velocity = r.value
-        tell(o, RUN)
-    elif r.kind == GO:
-        d.number = round(r.value)
-        tell(o, NUMBERED)
-    elif r.kind == HOME:
-        tell(o, SEEK)
-    elif r.kind == JOB:
-        d.number, d.laid = round(r.value), 0
-        tell(o, WORK)
-    else:
-        d.target = goal(o, r)
-        tell(o, TRAVEL)
-
-
-@hot_step
-def allowed_share(q: OperationParams, o: Operation, asked: float) -> float:
-    """Part of the largest speed: less at first and where the position is not known."""
-    share = asked
-    if o.trust == NOT_KNOWN:
-        share = min(share, q.creep)
-    if q.careful and not o.confirmed:
-        share = min(share, 0.1)
-    return share
-
-
-@step
-def manage(q: OperationParams, o: Operation, r: Request) -> None:
-    """What is done when it is asked, without motion."""
-    if r.kind == ENABLE:
-        enable(o)
-        o.client = r.client
-    elif r.kind == RESET:
-        o.state, o.fault = ordered(o.state, RESET_FAULT), 0
-        leave_torque(o)
-    elif r.kind == KEEP:
-        if o.kind == JOG:
-            o.lease = q.lease_looks
-    elif r.kind == CONFIRM:
-        o.confirmed = 1
-    elif r.kind in (TAKE, LEAVE):
-        hand_over(o, r)
-    elif r.kind == TRUST:
-        o.trust = round(min(max(r.value, 0.0), 2.0))
-    elif r.kind == ORDER:
-        take_order(o, round(min(max(r.value, 0.0), 6.0)), r.id)
-    elif r.kind == FEED:
-        o.demand.laid = round(r.value)
-    elif r.kind in (LOWER, UPPER):
-        move_end(q, o, r)
-
-
-@step
-def move_end(q: OperationParams, o: Operation, r: Request) -> None:
-    """An end of the travel moves under the operator's hand; a move that it cuts short is aborted, and rests there."""
-    d = o.demand
-    if r.kind == LOWER:
-        d.lowest, d.moved = r.value, d.moved | 1
-    else:
-        d.highest, d.moved = r.value, d.moved | 2
-    d.edited = 1
-    if o.kind in (MOVE_TO, MOVE_BY) and not is_allowed(q, o, d.target):
-        end_running(o, ABORTED, 0, r.id)
-
-
-@step
-def enable(o: Operation) -> None:
-    """All the way to operation enabled, if the method is ready; the target is where the axis is."""
-    if o.state == ENABLED:
-        return
-    o.state = ordered(ordered(ordered(o.state, SHUTDOWN), SWITCH_ON), ENABLE_OPERATION)
-    if o.state == ENABLED:
-        tell(o, HOLD)
-
-
-@step
-def hand_over(o: Operation, r: Request) -> None:
-    """Another one commands, or nobody; a motion under way is stopped first."""
-    if (r.kind == TAKE and o.client != r.client) or (r.kind == LEAVE and o.running):
-        stop(o, r.id)
-    o.client = r.client if r.kind == TAKE else 0
-
-
-@step
-def take_order(o: Operation, order: int, number: int) -> None:
-    """One order of the control word of CiA 402."""
-    before = o.state
-    if order == ENABLE_OPERATION and (o.answer.ready == 0 or o.barred):
-        return
-    o.state = ordered(before, order)
-    if o.state == ENABLED and before != ENABLED:
-        tell(o, HOLD)
-    if order == HALT_QUICKLY and o.state == QUICK_STOP and before == ENABLED:
-        o.epoch += 1
-        end_running(o, ABORTED, 0, number)
-        halt(o)
-    elif before in (ENABLED, QUICK_STOP) and o.state not in (ENABLED, QUICK_STOP):
-        end_running(o, ABORTED, 0, number)
-        leave_torque(o)
-    if before == FAULT and o.state != FAULT:
-        o.fault = 0
-        leave_torque(o)
-
-
 # ---------------------------------------------------------------------------------------------------- a look
 
 
@@ -535,11 +301,3 @@ def judge(q: OperationParams, o: Operation) -> None:
             end_running(o, DONE, 0, 0)
         elif 0 < q.settle_looks <= o.outside:
             fail_softly(o, NOT_SETTLED)
-
-
-@step
-def sum_of(number: int, kind: int, command: int, epoch: int, client: int, value: float, speed: float) -> int:
-    """Sum over a request, each word with an odd factor of its own, so that a torn record is seen."""
-    words = number * 3 + kind * 5 + command * 7 + epoch * 11 + client * 13
-    first, second = bits_of(value), bits_of(speed)  # folded, for the sum keeps 62 bits
-    return (words + (first ^ first >> 32) * 17 + (second ^ second >> 32) * 19) & SUM

@@ -16,6 +16,7 @@ import numpy as np
 from detent.axisfile.tables import AxisSpec
 from detent.control import operation as ops
 from detent.control.axis_states import STATE_NAMES
+from detent.control.commands import sum_of
 from detent.control.operation import ENDS, OperationParams
 from detent.errors import NO_MARK, OTHER_HARDWARE, DetentError
 from detent.methods.method import Live, Method, Work
@@ -392,7 +393,7 @@ def write_request(  # noqa: PLR0913 - a record
     k = (number - 1) % INBOX
     box.number[k], box.kind[k], box.id[k], box.epoch[k], box.client[k] = number, kind, command, epoch, client
     box.value[k], box.speed[k] = value, speed
-    box.check[k] = ops.sum_of(number, kind, command, epoch, client, float(value), float(speed))
+    box.check[k] = sum_of(number, kind, command, epoch, client, float(value), float(speed))
     box.written = number
 
 

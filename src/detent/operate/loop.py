@@ -12,6 +12,7 @@ for bit, by handing it the same requests in the same periods.
 import math
 from typing import Any
 
+from detent.control.commands import obey, sum_of
 from detent.control.operation import (
     DONE,
     NEEDS_ID,
@@ -24,10 +25,8 @@ from detent.control.operation import (
     judge,
     look,
     lose_torque,
-    obey,
     off,
     stop,
-    sum_of,
 )
 from detent.errors import LOOP_DEAD, LOOP_OVERRUN
 from detent.kernel.clock import monotonic_ns, sleep_until

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from detent.control import operation as ops
 from detent.control.axis_states import STATE_NAMES
+from detent.control.move_commands import lower_end, upper_end
 from detent.errors import REFUSAL_TEXT, AxisError, DetentError
 from detent.operate.loop import INJECT
 from detent.units import format_quantity, parse_quantity
@@ -200,7 +201,7 @@ def _end_of(q: Any, o: Any) -> str:
     """Soft limit that the commanded point stands at: lower, upper, or none of them."""
     if q.endless or not o.answer.ready or o.trust == ops.NOT_KNOWN:
         return ""
-    lowest, highest = ops.lower_end(q, o), ops.upper_end(q, o)
+    lowest, highest = lower_end(q, o), upper_end(q, o)
     near = 1e-6 * (highest - lowest)
     return "lower" if o.answer.commanded <= lowest + near else "upper" if o.answer.commanded >= highest - near else ""
 

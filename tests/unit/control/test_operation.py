@@ -7,6 +7,7 @@ import pytest
 
 from detent.control import operation as ops
 from detent.control.axis_states import ENABLED, FAULT, FAULT_REACTION, QUICK_STOP, SWITCH_ON_DISABLED
+from detent.control.commands import obey, sum_of
 from detent.control.operation import (
     Operation,
     OperationParams,
@@ -14,10 +15,8 @@ from detent.control.operation import (
     fail_softly,
     judge,
     look,
-    obey,
     off,
     stop,
-    sum_of,
 )
 
 EVERYTHING = sum(1 << kind for kind in ops.COMMANDS)

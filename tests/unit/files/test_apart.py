@@ -108,7 +108,9 @@ def test_an_absent_file_is_the_readers_affair(tmp_path):
         apart.read_apart(readers.stumbles, tmp_path / "nowhere", "a log")
 
 
-def test_ctrl_c_ends_the_reading_too(path):
+def test_ctrl_c_ends_the_reading_too(path, request):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # programs in the background ignore it
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     process, _ = apart.read_apart(readers.whoami, path, "a log")
     threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 
 from detent.control.guard import FOLLOWING
 from detent.control.guard import TRAVEL as END_OF_TRAVEL
+from detent.control.move_commands import lower_end, upper_end
 from detent.control.operation import (
     HALT,
     HOLD,
@@ -24,8 +25,6 @@ from detent.control.operation import (
     UPPER,
     Operation,
     OperationParams,
-    lower_end,
-    upper_end,
 )  # fmt: skip
 from detent.control.step_rule import AT_REST, FAULT, INFEASIBLE, OUT_OF_RANGE, REST, deflect, release
 from detent.control.step_table import StepTableParams, move_stop

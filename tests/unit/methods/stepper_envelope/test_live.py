@@ -47,7 +47,6 @@ def test_a_word_is_never_faster_than_asked():
     assert [word_of(p, hz) for hz in (4000.0, 3999.9, 0.0)] == [4000, 3999, 1]
 
 
-@pytest.mark.compiled
 def test_a_stepper_is_switched_on_and_off():
     axis = Stepper()
     host = axis.host
@@ -73,7 +72,6 @@ def test_a_stepper_is_switched_on_and_off():
     assert (off.how, trusted.how) == (DONE, DONE)
 
 
-@pytest.mark.compiled
 def test_a_stepper_in_fault_comes_down_its_ramp_and_is_reset():
     axis = Stepper()
     host = axis.host
