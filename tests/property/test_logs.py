@@ -158,7 +158,7 @@ def test_rotated_columns(folder, seed, shift, part):
     in_place_of_time = recording.columns[list(recording.columns)[-shift]][first:last]
     assume(np.mean(np.diff(in_place_of_time) < 0) > 0.15)
     rows[first:last] = [row[-shift:] + row[:-shift] for row in rows[first:last]]
-    log = recording.read(folder, rows)
+    log = recording.read(folder, rows, ["rotated=yes"])
     assert rows_told(log, Kind.ROTATED_COLUMNS) == set(range(first + 1, last + 1))
     assert same_values(log, recording, np.arange(recording.count))
 

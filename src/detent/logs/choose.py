@@ -10,6 +10,7 @@ from detent.logs.headings import BITS, ROLES, Conversion, find_conversion, rank,
 from detent.logs.log import Action, Draft, Kind, Severity, Source
 from detent.logs.mapping import Choice, ColumnMapping
 from detent.logs.raw_table import RawTable, tell
+from detent.logs.rotation import is_clock
 
 # Signals that a unit alone tells.
 _BY_UNIT = ("force", "torque", "current", "voltage", "temperature", "acceleration", "velocity")
@@ -74,6 +75,8 @@ def _guess(table: RawTable, chosen: Chosen, silent: set[str]) -> None:
         if role in chosen or role in silent:
             continue
         ranks = {name: place for name in _free(table, chosen) if (place := _rank(table, name, role)) is not None}
+        if role == "time":  # a column that does not run is none, whatever it is called, where another one runs
+            ranks = {name: place for name, place in ranks.items() if is_clock(table.columns[name])} or ranks
         if ranks:
             best = min(ranks, key=lambda name: ranks[name])
             chosen[role] = best

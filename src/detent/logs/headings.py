@@ -58,6 +58,9 @@ _MARKS = {
     "enabled": {"enable", "enabled"},
 }
 
+_ANY = frozenset({"actual", "measured", "measured motor", "istwert"})
+"""Names that fit every measured signal: they say position where nothing else in a heading says more."""
+
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
 _LEAST_FUZZY = 6
 
@@ -197,13 +200,18 @@ def rank(name: str, role: str) -> int | None:
 
     >>> rank("Time", "time"), rank("Current Error", "current"), rank("enconder", "position") is not None
     (1, None, True)
+    >>> rank("actual_q_0", "position") is not None, rank("actual_current_0", "position")
+    (True, None)
     """
     words = words_of(name)
     if not words or DERIVED & set(words):
         return None
-    names = ROLES[role].names
-    fitting = (place for place, known in enumerate(names) if _contains(words, known))
-    return next((place for place in fitting if not _means_other(words, names[place], role)), None)
+    others = (known for other in ROLES.values() if other.name != role for known in other.names)
+    is_other = bool(_ANY & set(words)) and any(_contains(words, known) for known in others)
+    for place, known in enumerate(ROLES[role].names):
+        if _contains(words, known) and not _means_other(words, known, role) and not (is_other and known in _ANY):
+            return place
+    return None
 
 
 def _contains(words: tuple[str, ...], known: str) -> bool:

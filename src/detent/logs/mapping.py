@@ -63,7 +63,7 @@ def _yes(value: object) -> bool:
         return True
     if value in (False, "no", "false"):
         return False
-    raise _refused("write incomplete = true")
+    raise _refused("write it as true or false")
 
 
 def _read_column(value: object) -> str:
@@ -108,6 +108,9 @@ class FileOptions(Table, frozen=True):
     header: int | None = optional("line of the header, 0 for none", None, ge=0, lt=10**6)
     table: str = optional("group, structure or list of a file that holds several", "")
     period: Time | None = optional("time between two rows of a file without a column for the time", None, gt=0)
+    rotated: Annotated[bool, PlainValidator(_yes)] = optional(
+        "cells that stand beside their headings are put back", default=False, allowed="true or yes, false or no"
+    )
     incomplete: Annotated[bool, PlainValidator(_yes)] = optional(
         "the trace of an aborted run is taken as far as it goes", default=False, allowed="true or yes, false or no"
     )

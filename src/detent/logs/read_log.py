@@ -45,7 +45,8 @@ def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None
     table = read_table(path, stated.file, apart=True)
     chosen = choose_columns(table, stated)
     if "time" in chosen:
-        mend_rotation(table, chosen["time"])
+        is_stated = any(choice.column for choice in stated.columns.values())
+        mend_rotation(table, chosen["time"], is_stated=is_stated, is_accepted=stated.file.rotated)
     if table.broken:
         reasons = list(dict.fromkeys(broken.reason for broken in table.broken))
         more = f" and {len(reasons) - 3} more reasons" if len(reasons) > 3 else ""

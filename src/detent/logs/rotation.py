@@ -1,4 +1,7 @@
-"""Columns that are rotated against the header: found by the column in which the clock really runs, and put right."""
+"""Columns that are rotated against the header: found by the column in which the clock really runs.
+
+They are put right where the file cannot be read otherwise, and where a person says so; never what a person has stated.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +27,21 @@ _COUNTERS = frozenset({"sample", "index", "row", "number", "line"})
 Rotation = tuple[int, NDArray[np.bool_]]  # by how many columns cells stand right of their headings, in which rows
 
 
-def mend_rotation(table: RawTable, time: str) -> None:
-    """Find rows whose cells are rotated against the header, and put the cells where they belong.
+def is_clock(values: Values) -> bool:
+    """Whether a column rises, and hardly ever goes back: it may be coarse, and stumble."""
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(np.any(steps > 0)) and float(np.mean(steps < 0)) <= _FEW
+
+
+def mend_rotation(table: RawTable, time: str, *, is_stated: bool = False, is_accepted: bool = False) -> None:
+    """Find rows whose cells are rotated against the header; `is_accepted`: a person says that they are.
 
     Where the column called time does not run at all or jumps about, and another runs like a clock for `SHORTEST` rows,
     the cells are rotated by the distance of the two. If the first row lacks as many cells as the others have too many
     in front, the lines of the file are broken in the wrong places: the first cells of a line belong to the row before.
+
+    Rows that are rotated where others are not are left out, and the columns of a file of which any `is_stated` stay
+    where they are; a file in which no clock runs is put right, and what then stands where is told.
     """
     if len(table.rows) < SHORTEST:
         return
@@ -45,17 +57,31 @@ def mend_rotation(table: RawTable, time: str) -> None:
     if found is None:
         return
     shift, where = found
+    is_whole = runs <= _HALF or where.mean() > _WHOLE
     head = _head(table, matrix, names.index(time), shift) if where.mean() > _WHOLE else None
     column, unit = names[(names.index(time) + shift) % len(names)], tell_count(shift, "column")
     text = f'the clock runs in "{short(column)}", not in "{short(time)}": cells are shifted {unit} to the right'
-    if head is None:
-        matrix[where] = np.roll(matrix[where], -shift, axis=1)
-        rows = table.rows[where]
-    else:
+    told, advice = row_ranges(table.rows[where]), ""
+    if head is not None:
         matrix = _reflow(table, matrix, shift, head)
-        rows, text = table.rows, f"{text}; line breaks are misplaced"
+        told, text, action = row_ranges(table.rows), f"{text}; line breaks are misplaced", Action.REORDERED
+    elif is_accepted or (is_whole and not is_stated):
+        matrix[where] = np.roll(matrix[where], -shift, axis=1)
+        text, action = f"{text}; now {_ranges(matrix[where], names)}", Action.REORDERED
+        advice = "" if is_accepted else f"if that is not so, state the columns, as in time={short(column)}"
+    elif is_whole:
+        action, advice = Action.LEFT, f"state time={short(column)}, or that the cells are rotated: rotated=yes"
+    else:
+        matrix, table.rows = matrix[~where], table.rows[~where]
+        action, advice = Action.REMOVED, "state rotated=yes to put their cells back"
     table.columns = {name: matrix[:, index] for index, name in enumerate(names)}
-    table.findings.append(Finding(Kind.ROTATED_COLUMNS, "", row_ranges(rows), text, Action.REORDERED))
+    table.findings.append(Finding(Kind.ROTATED_COLUMNS, "", told, text, action, advice))
+
+
+def _ranges(matrix: Values, names: list[str]) -> str:
+    """What each column holds, lowest to highest."""
+    low, high = np.nanmin(matrix, axis=0), np.nanmax(matrix, axis=0)
+    return ", ".join(f'"{short(name)}" {low[k]:.4g} to {high[k]:.4g}' for k, name in enumerate(names))
 
 
 def _best_rotation(matrix: Values, names: list[str], clock: int, step: float | None) -> Rotation | None:

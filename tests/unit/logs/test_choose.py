@@ -196,3 +196,13 @@ def test_time_by_the_period():
     draft = draft_of(table_of("x [mm]"), "period=2 ms")
     draft.convert()
     assert draft.t.tolist() == pytest.approx(np.arange(30) * 0.002)
+
+
+def test_a_duration_was_taken_for_the_clock_and_all_columns_moved():
+    """Logs of a robot: the last column says how long each cycle took, and the clock is called timestamp."""
+    names = ["timestamp", "actual_current_0", "actual_q_0", "actual_qd_0", "actual_execution_time"]
+    table = table_of(*names)
+    found, _ = chosen(table)
+    assert found == {"time": "timestamp", "position": "actual_q_0", "velocity": "actual_qd_0",
+                     "current": "actual_current_0"}  # fmt: skip
+    assert list(table.columns) == names

@@ -21,9 +21,9 @@ def table_of(matrix, names=NAMES, rows=None, broken=()):
     return RawTable("log.csv", columns, rows, dict.fromkeys(names, ""), broken=list(broken))
 
 
-def mended(*args, time="t", **kwargs):
+def mended(*args, time="t", is_stated=False, is_accepted=False, **kwargs):
     table = table_of(*args, **kwargs)
-    mend_rotation(table, time)
+    mend_rotation(table, time, is_stated=is_stated, is_accepted=is_accepted)
     return table, np.column_stack(list(table.columns.values()))
 
 
@@ -40,13 +40,34 @@ def test_all_rows_rotated(shift):
     (finding,) = table.findings
     assert (finding.kind, finding.action, finding.rows) == (Kind.ROTATED_COLUMNS, Action.REORDERED, ((1, N),))
     assert f'the clock runs in "{NAMES[shift]}", not in "t": cells are shifted {shift} column' in finding.text
+    assert 'now "t" 100 to 2e+04, "x" ' in finding.text
+    assert finding.advice == f"if that is not so, state the columns, as in time={NAMES[shift]}"
 
 
-@pytest.mark.parametrize(("first", "last"), [(50, 120), (0, 15), (180, 200), (100, 200)])
-def test_some_rows_rotated(first, last):
+def test_stated_columns_stay_where_they_are():
+    rotated = np.roll(MATRIX, 1, axis=1)
+    table, matrix = mended(rotated, is_stated=True)
+    assert (matrix == rotated).all()
+    (finding,) = table.findings
+    assert finding.action is Action.LEFT
+    assert finding.advice == "state time=x, or that the cells are rotated: rotated=yes"
+    table, matrix = mended(rotated, is_stated=True, is_accepted=True)
+    assert (matrix == MATRIX).all()
+    assert (table.findings[0].action, table.findings[0].advice) == (Action.REORDERED, "")
+
+
+@pytest.mark.parametrize(("first", "last"), [(50, 120), (0, 15), (180, 200), (110, 200)])
+@pytest.mark.parametrize("is_stated", [False, True])
+def test_some_rows_rotated(first, last, is_stated):
     broken = MATRIX.copy()
     broken[first:last] = np.roll(broken[first:last], 1, axis=1)
-    table, matrix = mended(broken)
+    table, matrix = mended(broken, is_stated=is_stated)
+    (finding,) = table.findings
+    assert (finding.rows, finding.action) == (((first + 1, last),), Action.REMOVED)
+    assert "rotated=yes" in finding.advice
+    assert (matrix == np.delete(MATRIX, slice(first, last), axis=0)).all()
+    assert table.rows.tolist() == [*range(1, first + 1), *range(last + 1, N + 1)]
+    table, matrix = mended(broken, is_stated=is_stated, is_accepted=True)
     assert (matrix == MATRIX).all()
     assert table.findings[0].rows == ((first + 1, last),)
 
@@ -59,7 +80,7 @@ def test_a_column_that_goes_on_like_the_clock_by_chance_ends_where_the_clock_is_
         true[outside, 1] = 5.0 + 130.0 * np.arange(len(true[outside]))
     broken = true.copy()
     broken[first:last] = np.roll(broken[first:last], 1, axis=1)
-    table, matrix = mended(broken)
+    table, matrix = mended(broken, is_accepted=True)
     assert (matrix == true).all()
     assert table.findings[0].rows == ((first + 1, last),)
 
