@@ -42,6 +42,7 @@ from tests import (
     live_store,
 )
 from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
+from tests.cascade_rig import BY_HAND
 from tests.course_rig import excursions, follow, shortest_stop, turns
 from tests.difference import diff
 from tests.live_axes import PAGES, PLAIN, Head, Stepper, longest_stop, moves
@@ -1765,7 +1766,7 @@ def spoil(axis: Lost, what: str) -> None:
      ("index", "no mark", 344)],
 )  # fmt: skip
 def test_22_homing_that_fails_says_why_and_knows_nothing(way, what, code):
-    axis = Lost(way, Random(5))
+    axis = Lost(way, Random(5), *BY_HAND)  # stiffer ones let the guard see the block, too, and switch off
     spoil(axis, what)
     axis.pass_time(0.002)
     failed = axis.do(ops.HOME)

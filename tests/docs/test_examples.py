@@ -70,10 +70,10 @@ def test_every_cell_of_a_notebook_runs_and_shows_something(path, tmp_path, monke
         ways = [getattr(value, way)() for way in ("_repr_html_", "_repr_png_") if hasattr(value, way)]
         assert not ways or any(ways), f"cell {number} shows nothing in a notebook"
     # What the text between the cells says of the figures.
-    axis, stiffer, found = names["axis"], names["stiffer"], names["found"]
-    assert axis.linear().margins["command"].sensitivity > 2.0
-    assert stiffer.linear().margins["command"].sensitivity < 1.75
-    assert names["errors"]["new"].std() < names["errors"]["file"].std()
+    axis, by_ear, found = names["axis"], names["by_ear"], names["found"]
+    assert by_ear.linear().margins["command"].sensitivity > 2.0
+    assert axis.linear().margins["command"].sensitivity < 1.75
+    assert names["errors"]["file"].std() < names["errors"]["by ear"].std()
     assert "mass" in {contrast.name for contrast in found.contrasts()}
     assert found.trusted["mass"].relative_error < 0.01
 

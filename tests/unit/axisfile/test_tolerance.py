@@ -21,7 +21,7 @@ def read(*entries: str) -> dict[str, Tolerance]:
         ('"mechanics.load_mass" = "10 %"', 27.0, 33.0),
         ('mechanics.load_mass = "10 %"', 27.0, 33.0),
         ('"mechanics.coupling.stiffness" = ["51 N/um", "69 N/um"]', 51e6, 69e6),
-        ('"method.position_gain" = [30, 45.5]', 30.0, 45.5),
+        ('"method.position_gain" = [80, 95.5]', 80.0, 95.5),
         ('"drive.delay" = [1, 2]', 1, 2),
         ('"mechanics.coupling.stiffness" = { interval = "10 %", distribution = "normal" }', 54e6, 66e6),
     ],

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.cascade_rig import BY_HAND
 
 import detent
 from detent.errors import DetentError
@@ -18,14 +19,17 @@ def model_of(name: str) -> LinearModel:
 
 
 def test_the_margins_are_those_that_check_prints() -> None:
-    axis = detent.load(detent.example("cascade.toml"))
+    axis = detent.load(detent.example("cascade.toml"), BY_HAND)
     figures, margins = CascadeFigures(axis.spec), axis.linear().margins
     for cut, told in (("velocity", figures.loop.velocity_loop), ("position", figures.loop.position_loop)):
         assert margins[cut].crossover == pytest.approx(told.crossover, rel=1e-6)
         assert margins[cut].phase == pytest.approx(told.phase, abs=1e-6)
     assert margins["command"].gain == pytest.approx(figures.loop.gain_margin, rel=1e-3)
-    # The published design of this axis: Ms on the resonance, where no margin of the position loop shows it.
+    # Gains by hand: Ms on the resonance, where no margin of the position loop shows it.
     assert margins["command"].sensitivity == pytest.approx(2.22, abs=0.01)
+    told = {row.name: row.value for row in axis.check().derived}
+    assert told["Ms at the command"] == pytest.approx(margins["command"].sensitivity, rel=1e-6)
+    assert told["frequency of Ms"] == pytest.approx(margins["command"].peak, rel=1e-5)
     assert margins["command"].peak == pytest.approx(344.0, abs=1.0)
 
 

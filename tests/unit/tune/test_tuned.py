@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
+from tests.cascade_rig import by_hand
 from typer.testing import CliRunner
 
 import detent
@@ -22,7 +23,7 @@ def run(*words: str):
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     made = tmp_path / "slide.toml"
-    made.write_text(CASCADE.read_text(encoding="utf-8") + TOLERANCE, encoding="utf-8")
+    made.write_text(by_hand(CASCADE.read_text(encoding="utf-8")) + TOLERANCE, encoding="utf-8")
     return made
 
 

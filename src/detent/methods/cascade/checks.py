@@ -20,6 +20,7 @@ MOST_COUNTS = 2**53  # counts of an encoder: beyond them a float no longer knows
 QUICK = 0.1  # bandwidth of a velocity loop that is proposed [rad] over its dead time: it keeps far from its limit
 
 LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, math.radians(30)  # below them a loop rings
+LARGEST_SENSITIVITY = 2.0  # Ms at the command: it leaves a gain margin of 2 and 29 degrees
 LARGEST_PEAK = 1.3  # of the reference to the position, without feedforward
 NEAR_RESONANCE = 0.5  # share of the anti-resonance above which a velocity loop on the motor leaves the load behind
 LARGEST_JUMP = 0.1  # share of the largest command by which one count may move the drive
@@ -269,6 +270,11 @@ def _loops(m: CascadeFigures) -> Iterator[Caution]:
             value, limit = text(inner.phase, "rad", 3), f"at least {text(LEAST_PHASE_MARGIN, 'rad')}"
             remedy = f"lower {gain}, or shorten the dead time of {text(dead_time(m.spec), 's', 3)}"
             yield Caution(f"phase margin of the {name}", value, limit, "it rings after every setpoint change", remedy)
+    level, peak = loop.sensitivity
+    if level > LARGEST_SENSITIVITY:
+        value, limit = f"{level:.3g} at {text(peak, 'Hz', 3)}", f"up to {LARGEST_SENSITIVITY:g}"
+        consequence = "disturbances near this frequency are amplified so many times, and little gain is left"
+        yield Caution("Ms at the command", value, limit, consequence, "choose gains with `detent tune`")
 
 
 def _lowered(m: CascadeFigures, share: float) -> str:

@@ -210,6 +210,11 @@ def _loops(m: CascadeFigures) -> Iterator[Derived]:
             yield Derived(f"phase margin of the {name}", margin.phase, "rad", text, "smallest over all gain crossovers")
     formula = "factor on the overall loop gain at which a mode no longer decays"
     yield Derived("gain margin", m.loop.gain_margin, "", f"{m.loop.gain_margin:.3g}", formula)
+    if m.loop.spectral_radius < 1.0:
+        level, peak = m.loop.sensitivity
+        formula = "largest 1/|1 + L|, both loops cut open where the amplifier sees them"
+        yield Derived("Ms at the command", level, "", f"{level:.3g}", formula)
+        yield m.figure("frequency of Ms", peak, "Hz", "where a disturbance is amplified most")
 
 
 def _errors(m: CascadeFigures) -> Iterator[Derived]:

@@ -22,7 +22,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.analysis.linear_system import LinearSystem, Margins, gain_limit, margins_of, usual_frequencies
+from detent.analysis.linear_system import (
+    LinearSystem,
+    Margins,
+    gain_limit,
+    largest_level,
+    margins_of,
+    usual_frequencies,
+)
 from detent.methods.cascade.schema import CascadeSpec
 from detent.plant.linear_two_mass import linear_plant
 
@@ -84,6 +91,16 @@ class LinearLoop:
     def position_loop(self) -> Margins:
         """Margins of the position loop around it; of a PID, of its only loop."""
         return margins_of(lambda at: self._open_loops(at)[1], self.frequencies, self.period)
+
+    @cached_property
+    def sensitivity(self) -> tuple[float, float]:
+        """Ms at the command, largest magnitude of 1/(1 + L) where the amplifier sees both loops, and where [Hz]."""
+
+        def level(at: Numbers) -> Numbers:
+            inner, outer = self._open_loops(at)
+            return 1.0 / np.maximum(np.abs((1.0 + inner) * (1.0 + outer)), 1e-300)
+
+        return largest_level(level, self.open_loop("command").frequencies())
 
     @cached_property
     def held(self) -> tuple[Numbers, Numbers]:

@@ -2,6 +2,7 @@
 
 import pytest
 from tests.bad_files import example_text
+from tests.cascade_rig import by_hand
 
 SHORT = """[axis]
 name = "bare"
@@ -27,8 +28,8 @@ velocity_gain = "500 V*s/m"
 
 @pytest.fixture(scope="session")
 def good_text():
-    """Text of the packaged linear example, without its head comment (line 1 is ``[axis]``)."""
-    return example_text("cascade")
+    """Text of the packaged linear example with gains by hand, without its head comment (line 1 is ``[axis]``)."""
+    return by_hand(example_text("cascade"))
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ from tests.remedies import check_caution
 
 from detent.methods.cascade.checks import find_cautions
 
+TUNED = ("method.position_gain=90.4", "method.velocity_gain=59.3 V*s/m", "method.velocity_integral=5.75 kV/m")
 PID = (
     "method.structure=pid",
     "method.proportional=4 kV/m",
@@ -30,10 +31,10 @@ def cautions(load_text, good_text, rotary_text):
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [
-        ("cascade", ()),
+        ("cascade", TUNED),
         ("turntable", ()),
-        ("cascade", PID),
-        ("cascade", ("method.velocity_integral=0 V/m",)),
+        ("cascade", (*PID, "method.derivative=60 V*s/m")),
+        ("cascade", (*TUNED, "method.velocity_integral=0 V/m")),
         ("turntable", ("mechanics.coupling.backlash=0.1 deg", "method.feedback.position=motor")),
     ],
 )
@@ -51,6 +52,7 @@ CASES = [
         ["method.velocity_gain=30 V*s/m", "method.velocity_integral=10 kV/m"],
         "phase margin of the velocity loop",
     ),
+    ("cascade", [], "Ms at the command"),
     ("cascade", [*PID, "method.derivative=10 V*s/m"], "phase margin of the position loop"),
     ("cascade", ["method.position_gain=400"], "peak of the position loop"),
     ("cascade", ["mechanics.coupling.stiffness=5 N/um"], "bandwidth of the velocity loop"),

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.cascade_rig import BY_HAND
 from tests.places import DATA
 from tests.planned_jobs import plan_job
 
@@ -29,7 +30,7 @@ pytestmark = pytest.mark.compiled
 
 RECORDING = DATA / "emps" / "DATA_EMPS.mat"
 
-FINE = ("encoder.resolution=20 nm", "method.sample_period=1 ms", "method.velocity_gain=40 V*s/m")
+FINE = (*BY_HAND, "encoder.resolution=20 nm", "method.sample_period=1 ms", "method.velocity_gain=40 V*s/m")
 
 
 def linear(*overrides):
