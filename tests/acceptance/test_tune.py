@@ -334,3 +334,29 @@ def moved_and_pushed(gains) -> tuple[float, float, float, float]:
     way, error_then = (np.array(rest[name])[first - 2 : last] for name in ("plant.machine.load.position", error))
     back = np.flatnonzero(np.abs(error_then) > 5e-6)[-1] * period
     return off[:end].max(), off[end:].max(), np.abs(way - way[0]).max(), back
+
+
+# ---- hunting
+
+
+PID = ("method.structure=pid", "method.proportional=9 kV/m", "method.integral=200 kV/(m*s)",
+       "method.derivative=100 V*s/m")  # fmt: skip
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("structure", [(), PID])
+def test_26_a_dead_band_changes_nothing_while_the_axis_moves_or_is_outside(structure):
+    """That a band of 0 leaves every bit is what tests/acceptance/test_golden_bits.py shows."""
+    names = ["controller.law.position_error", "controller.reference.velocity", "controller.motor_sensor.velocity",
+             "controller.law.integral", "plant.machine.motor.position"]  # fmt: skip
+    axes = [detent.load(CASCADE, [*structure, f"method.dead_band={band} um"]) for band in (0, 2)]
+    free, banded = (axis.run(one_move("there", 0.05, 0.5), signals=names).trace for axis in axes)
+    error, asked, speed, integral, _ = (np.array(banded[name]) for name in names)
+    held = (asked == 0.0) & (np.abs(speed) < 0.02 * 1e-6 / 0.25e-3) & (np.abs(error) <= 2e-6)
+    begin, end = np.flatnonzero(asked)[[0, -1]]
+    assert not held[begin:end].any()
+    first = end + np.flatnonzero(held[end:])[0]
+    for name in names:
+        assert np.array_equal(np.array(free[name])[begin:first], np.array(banded[name])[begin:first])
+    assert np.all(np.diff(integral)[held[1:]] == 0.0)
+    assert np.any(np.diff(np.array(free["controller.law.integral"])[first:]) != 0.0)
