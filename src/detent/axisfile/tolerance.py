@@ -65,6 +65,14 @@ class Tolerance:
         return f"{low} to {high}{', 95 % of all' if self.normal else ''}"
 
 
+def value_of(spec: Any, key: str) -> float:
+    """Value of a dotted key."""
+    at: Any = spec
+    for part in key.split("."):
+        at = cast("Any", at)[part] if isinstance(at, dict) else getattr(at, part)
+    return float(at)
+
+
 def read_tolerances(
     table: object, spec: Table, model: type[Table], reporter: Reporter
 ) -> tuple[dict[str, Tolerance], list[FileProblem]]:
