@@ -10,6 +10,7 @@ from tests.acceptance.test_golden_bits import EXAMPLES
 
 import detent
 from detent.analysis.sampled_loop import SampledLoop
+from detent.analysis.sensitivity import clopper_pearson, sensitivity
 from detent.axis import Axis
 from detent.errors import InputError
 from detent.files.source import parse_source
@@ -334,3 +335,24 @@ def moved_and_pushed(gains) -> tuple[float, float, float, float]:
     way, error_then = (np.array(rest[name])[first - 2 : last] for name in ("plant.machine.load.position", error))
     back = np.flatnonzero(np.abs(error_then) > 5e-6)[-1] * period
     return off[:end].max(), off[end:].max(), np.abs(way - way[0]).max(), back
+
+
+# ---- tolerance
+
+
+def test_30_first_order_indices_of_ishigamis_function():
+    x = np.random.default_rng(30).uniform(-np.pi, np.pi, (3, 100_000))
+    found = sensitivity(
+        dict(zip("abc", x, strict=True)), np.sin(x[0]) + 7 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0])
+    )
+    assert found is not None
+    for key, share in (("a", 0.314), ("b", 0.442), ("c", 0.0)):
+        assert found.share[key].value == pytest.approx(share, abs=0.01)
+        assert found.share[key].low <= share + 0.002
+        assert found.share[key].high >= share - 0.002
+
+
+def test_31_the_interval_of_a_yield():
+    assert clopper_pearson(99_900, 100_000) == pytest.approx((0.998784, 0.999186), abs=1e-5)
+    assert clopper_pearson(100_000, 100_000) == pytest.approx((0.999963, 1.0), abs=1e-5)
+    assert clopper_pearson(965, 1000) == pytest.approx((0.95166, 0.97550), abs=1e-5)
