@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent import __version__
-from detent.axisfile.tolerance import TABLE, Tolerance, value_of
+from detent.axisfile.tolerance import TABLE, Tolerance, joint, value_of
 from detent.errors import DetentError
 from detent.files.source import parse_source
 from detent.kernel.cache import source_hash
@@ -91,6 +91,11 @@ class Question:
         """What is asked of an axis file; refused where nothing of it is toleranced."""
         if not 0 <= seed <= MOST_SEED:
             raise DetentError(f"seed: got {seed}; expected: a whole number from 0 to {MOST_SEED}; give one of these")
+        if file.untrusted:
+            raise DetentError(
+                f"{file.file}: got {', '.join(file.untrusted)} not trusted; expected: an interval of each in "
+                "[tolerance]; record what `detent identify --job FILE` writes, or state the interval by hand"
+            )
         if not file.tolerance:
             raise DetentError(
                 f"{file.file}: got no table [tolerance]; expected: at least one key in it, such as "
@@ -216,9 +221,10 @@ def draw(question: Question, first: int, count: int) -> dict[str, Numbers]:
     dict of str to ndarray of float64, shape (count,)
         By key, in SI units; case 0 has the values of the file.
     """
-    found = dict[str, Numbers]()
+    found, own = dict[str, Numbers](), {one.key: one for one in question.tolerance}
+    places = joint(own, {key: shares(question.seed, key, first, count) for key in own})
     for one in question.tolerance:
-        found[one.key] = _at(one, shares(question.seed, one.key, first, count))
+        found[one.key] = _at(one, places[one.key])
         if first == 0 and count:
             found[one.key][0] = question.nominal[one.key]
     return found
