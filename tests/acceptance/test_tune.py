@@ -7,6 +7,7 @@ import random
 import numpy as np
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
+from tests.tolerance_rig import QUESTION, fill, fill_killed
 
 import detent
 from detent.analysis.sampled_loop import SampledLoop
@@ -21,6 +22,7 @@ from detent.methods.load import axis_of, load_spec
 from detent.methods.moves.job import one_move
 from detent.methods.rotary_table.loop import HeldLoop
 from detent.methods.tuning import Bounds
+from detent.tune import store
 from detent.tune.choice import Chooser
 from detent.tune.plants import Plants
 
@@ -356,3 +358,24 @@ def test_31_the_interval_of_a_yield():
     assert clopper_pearson(99_900, 100_000) == pytest.approx((0.998784, 0.999186), abs=1e-5)
     assert clopper_pearson(100_000, 100_000) == pytest.approx((0.999963, 1.0), abs=1e-5)
     assert clopper_pearson(965, 1000) == pytest.approx((0.95166, 0.97550), abs=1e-5)
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(("cases", "kills"), [(2000, 2), pytest.param(20_000, 20, marks=pytest.mark.long)])
+def test_35_a_store_outlives_kills_at_any_moment(tmp_path, cases, kills):
+    """Chunks of 100 cases that cost as much as they do on a machine."""
+    killed, whole, note = tmp_path / "killed", tmp_path / "whole", tmp_path / "calls"
+    fill_killed(killed, cases, note, random.Random(35), kills)
+    kept = {path.name for path in killed.glob("chunk-*.npz")}
+    already = len(note.read_text().splitlines())
+    (killed / "chunk-000000.npz.part").write_bytes(b"PK")
+    fill(killed, cases, note=str(note))
+    assert len(note.read_text().splitlines()) == already + cases // 100 - len(kept)
+    # The one that was being made may have been computed and not kept: once more for each kill, at most.
+    assert already <= len(kept) + kills
+    fill(whole, cases)
+    assert sorted(path.name for path in killed.iterdir()) == sorted(path.name for path in whole.iterdir())
+    for path in whole.iterdir():
+        assert (killed / path.name).read_bytes() == path.read_bytes()
+    with pytest.raises(InputError, match="another seed"), store.opened(killed, {**QUESTION, "hash": "", "seed": 2}):
+        pass

@@ -124,7 +124,7 @@ def _index(found: Values, least: float, most: float) -> Index:
 def _sums(weights: Values, cell: NDArray[np.intp], cells: int, group: NDArray[np.intp]) -> Values:
     """Sums by group and cell, shape (groups, cells)."""
     groups = int(group[-1]) + 1
-    return np.bincount(group * cells + cell, weights, groups * cells).reshape(groups, cells)
+    return np.bincount(group * cells + cell, weights, groups * cells).reshape(groups, cells).astype(np.float64)
 
 
 def _taken(sums: Values, taken: NDArray[np.int64]) -> Values:
