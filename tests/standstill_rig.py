@@ -1,4 +1,4 @@
-"""Axes at standstill: the packaged cascade example, and what the tune specification calls the rigid one."""
+"""Axes at standstill: the packaged cascade example with its gains by hand, and what the tune specification calls the rigid one."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,8 +7,9 @@ from detent.axis import Axis
 from detent.files.source import parse_source
 from detent.methods.load import axis_of
 from tests.acceptance.test_golden_bits import EXAMPLES
+from tests.cascade_rig import by_hand
 
-TEXT = (EXAMPLES / "cascade.toml").read_text(encoding="utf-8")
+TEXT = by_hand((EXAMPLES / "cascade.toml").read_text(encoding="utf-8"))
 COUPLING = TEXT.index("[mechanics.coupling]"), TEXT.index("[mechanics.friction.positive]")
 RIGID = (TEXT[: COUPLING[0]] + TEXT[COUPLING[1] :]).replace('coulomb = "8 N"', 'coulomb = "0 N"')
 

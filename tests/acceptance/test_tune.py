@@ -9,9 +9,11 @@ import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
 from tests.standstill_rig import both, example, rigid, told
+from tests.tolerance_rig import QUESTION, fill, fill_killed
 
 import detent
 from detent.analysis.sampled_loop import SampledLoop
+from detent.analysis.sensitivity import clopper_pearson, sensitivity
 from detent.axis import Axis
 from detent.errors import InputError
 from detent.files.source import parse_source
@@ -22,6 +24,7 @@ from detent.methods.load import axis_of, load_spec
 from detent.methods.moves.job import one_move
 from detent.methods.rotary_table.loop import HeldLoop
 from detent.methods.tuning import Bounds
+from detent.tune import store
 from detent.tune.choice import Chooser
 from detent.tune.plants import Plants
 from detent.tune.standstill import standstill
@@ -483,3 +486,43 @@ def test_20_a_knock_starts_what_friction_holds():
     assert 5e-6 <= slow.swing("motor") <= 10e-6
     assert 1.0 <= slow.period <= 8.0
     assert {kind.name for kind in stands(example("method.velocity_gain=340 V*s/m")).kinds} == {"stick-slip"}
+# ---- tolerance
+
+
+def test_30_first_order_indices_of_ishigamis_function():
+    x = np.random.default_rng(30).uniform(-np.pi, np.pi, (3, 100_000))
+    found = sensitivity(
+        dict(zip("abc", x, strict=True)), np.sin(x[0]) + 7 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0])
+    )
+    assert found is not None
+    for key, share in (("a", 0.314), ("b", 0.442), ("c", 0.0)):
+        assert found.share[key].value == pytest.approx(share, abs=0.01)
+        assert found.share[key].low <= share + 0.002
+        assert found.share[key].high >= share - 0.002
+
+
+def test_31_the_interval_of_a_yield():
+    assert clopper_pearson(99_900, 100_000) == pytest.approx((0.998784, 0.999186), abs=1e-5)
+    assert clopper_pearson(100_000, 100_000) == pytest.approx((0.999963, 1.0), abs=1e-5)
+    assert clopper_pearson(965, 1000) == pytest.approx((0.95166, 0.97550), abs=1e-5)
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(("cases", "kills"), [(2000, 2), pytest.param(20_000, 20, marks=pytest.mark.long)])
+def test_35_a_store_outlives_kills_at_any_moment(tmp_path, cases, kills):
+    """Chunks of 100 cases that cost as much as they do on a machine."""
+    killed, whole, note = tmp_path / "killed", tmp_path / "whole", tmp_path / "calls"
+    fill_killed(killed, cases, note, random.Random(35), kills)
+    kept = {path.name for path in killed.glob("chunk-*.npz")}
+    already = len(note.read_text().splitlines())
+    (killed / "chunk-000000.npz.part").write_bytes(b"PK")
+    fill(killed, cases, note=str(note))
+    assert len(note.read_text().splitlines()) == already + cases // 100 - len(kept)
+    # The one that was being made may have been computed and not kept: once more for each kill, at most.
+    assert already <= len(kept) + kills
+    fill(whole, cases)
+    assert sorted(path.name for path in killed.iterdir()) == sorted(path.name for path in whole.iterdir())
+    for path in whole.iterdir():
+        assert (killed / path.name).read_bytes() == path.read_bytes()
+    with pytest.raises(InputError, match="another seed"), store.opened(killed, {**QUESTION, "hash": "", "seed": 2}):
+        pass

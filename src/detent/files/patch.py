@@ -6,7 +6,7 @@ the last key of its table: tomlkit would put it behind the comments above the ne
 
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, cast
 
 from detent.errors import InputError
@@ -17,6 +17,7 @@ from detent.files.text import lines_of
 from detent.units import format_quantity, in_unit_of
 
 DIGITS = 6  # of a value
+TOLERANCE = "tolerance"  # the table whose keys name those of other tables
 _NOTE = re.compile(r"(?:^#|;) (?:identified|tuned)(, .*? before)?: .*$")  # what an earlier time said of a value
 
 
@@ -28,6 +29,15 @@ class NewValue(NamedTuple):
     unit: str  # SI unit
     note: str  # what is said of it in a comment
     by: str = "identified"  # or "tuned": where it comes from
+    text: str = ""  # as it is written, where it is no number
+
+    def path(self, tables: Mapping[str, Any]) -> Path:
+        """The key as a file has it: a key of the table of tolerances stands in quotes, unless in tables of its own."""
+        whole = tuple(self.key.split("."))
+        inside: Any = tables
+        for part in whole:
+            inside = cast("dict[str, Any]", inside).get(part) if isinstance(inside, dict) else None
+        return whole if whole[0] != TOLERANCE or inside is not None else (TOLERANCE, ".".join(whole[1:]))
 
 
 class Change(NamedTuple):
@@ -65,9 +75,10 @@ def patch(text: str, values: Iterable[NewValue], file: str) -> tuple[str, list[C
     made, changes, fits = "", list[Change](), False
     try:
         wanted = tomllib.loads(text)
-        made, changes = _put_all(text, values)
-        for change in changes:
-            put_value(wanted, tuple(change.key.split(".")), tomllib.loads(f"value = {change.after}")["value"])
+        placed = [(value.path(wanted), value) for value in values]
+        made, changes = _put_all(text, placed)
+        for (path, _), change in zip(placed, changes, strict=True):
+            put_value(wanted, path, tomllib.loads(f"value = {change.after}")["value"])
         fits = tomllib.loads(made) == wanted
     except (TOMLKitError, ValueError):
         pass
@@ -79,31 +90,31 @@ def patch(text: str, values: Iterable[NewValue], file: str) -> tuple[str, list[C
     return order + made, [change for change in changes if change.before != change.after]
 
 
-def _put_all(text: str, values: Iterable[NewValue]) -> tuple[str, list[Change]]:
+def _put_all(text: str, values: Iterable[tuple[Path, NewValue]]) -> tuple[str, list[Change]]:
     """A text with values, and what became of each key; ValueError where tomlkit would change more than these."""
     import tomlkit
 
     document, changes, lines = tomlkit.parse(text), list[Change](), list[tuple[Path, str]]()
     if document.as_string() != text:
         raise ValueError(text)
-    for value in values:
-        change, line = _put(document, value)
+    for path, value in values:
+        change, line = _put(document, path, value)
         changes.append(change)
-        lines += [(tuple(value.key.split(".")), line)] if line else []
+        lines += [(path, line)] if line else []
     text = document.as_string()
     for path, line in lines:
         text = _add(text, path, line)
     return text, changes
 
 
-def _put(document: Any, value: NewValue) -> tuple[Change, str]:
+def _put(document: Any, path: Path, value: NewValue) -> tuple[Change, str]:
     """Replace a value, or add it to a table in one line; else the line to be added for it."""
     from tomlkit import inline_table
     from tomlkit import value as item_of
     from tomlkit.items import InlineTable
 
     table: Any = document
-    in_line, path = False, value.key.split(".")
+    in_line = False
     for part in path[:-1]:
         if part not in table:
             if not in_line:
@@ -142,6 +153,8 @@ def _new(value: NewValue) -> tuple[Change, str]:
 
 def _written(value: NewValue, old: Any) -> str:
     """A value as it is written in a file: in the unit and the quotes of the old one."""
+    if value.text:
+        return value.text
     if not value.unit:
         return f"{value.value:.{DIGITS}g}"
     if not isinstance(old, str):
@@ -165,7 +178,7 @@ def _add(text: str, path: Path, line: str) -> str:
     own = path[len(around) :]
     is_dotted = any(known[: len(around) + 1] == path[: len(around) + 1] for known in inside)
     if len(own) > 1 and not is_dotted:
-        return f"{text.rstrip()}{newline}{newline}[{dotted(path[:-1])}]{newline}{path[-1]} = {line}{newline}"
+        return f"{text.rstrip()}{newline}{newline}[{dotted(path[:-1])}]{newline}{dotted(path[-1:])} = {line}{newline}"
     head = next((row for row, one in enumerate(lines) if not one.startswith("#")), len(lines))
     row = max([begin or head, *(place.line + place.text.count("\n") for place in inside.values())])
     lines.insert(row, f"{_indent(lines, inside)}{dotted(own)} = {line}")

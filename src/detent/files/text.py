@@ -243,7 +243,7 @@ def writing(path: Path, *, force: bool = False) -> Generator[Path]:
     with ExitStack() as alone, write_errors(path):
         group = _GROUP.get()
         held = group.held if group else alone
-        held.enter_context(_held(part, path))
+        held.enter_context(alone_in(part, path))
         _UNFINISHED[part] = None
         held.callback(_drop, part)
         yield part
@@ -330,7 +330,7 @@ def placing(folder: Path, others: Collection[str] = (), *, force: bool = False) 
             with write_errors(folder / name):
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     refuse_others([folder / name for name in others], force=force)
-    with _held(folder, folder) as alone:
+    with alone_in(folder, folder) as alone:
         made = folder / f"{_MADE}{os.getpid()}"
         for left in [*folder.glob(f"{_MADE}*")] if alone else [made]:
             _finish(left)
@@ -383,7 +383,7 @@ def _finish(made: Path) -> None:
 
 
 @contextmanager
-def _held(place: Path, told: Path) -> Generator[bool]:
+def alone_in(place: Path, told: Path) -> Generator[bool]:
     """Have a folder, or a file being made, for this process alone until it ends; False where no such locks are."""
     try:
         import fcntl
@@ -406,6 +406,16 @@ def _held(place: Path, told: Path) -> Generator[bool]:
                 if os.path.samestat(os.fstat(held), place.stat()):
                     break
         yield True
+
+
+def sync_folder(folder: Path) -> None:
+    """Let the names in a folder outlive a loss of power, as `fsync` does with what is in a file."""
+    with suppress(PermissionError):  # Windows opens no folders
+        opened = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)
 
 
 def abandon() -> list[Path]:

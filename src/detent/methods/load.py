@@ -58,6 +58,7 @@ class AxisFile(OnScreen):
     overrides: tuple[str, ...] = ()
     changes: dict[str, Any] = field(default_factory=dict[str, Any])
     tolerance: Mapping[str, Tolerance] = field(default_factory=dict[str, Tolerance])  # by key, what is not known of it
+    untrusted: tuple[str, ...] = ()  # keys of which not even that is known
 
     def replaced(self, changes: Mapping[str, Any]) -> "AxisFile":
         """The same with other values, checked as a whole."""
@@ -112,7 +113,9 @@ def axis_of(source: Source, overrides: Sequence[str] = (), changes: dict[str, An
     tolerance, wrong = read_tolerances(stated, spec, model, reporter) if not problems else ({}, [])
     if problems or wrong:
         raise InputError([*problems, *wrong])
-    return AxisFile(source.file, spec, *_origins(source, layers, spec), source, tuple(overrides), changes, tolerance)
+    origins, known = _origins(source, layers, spec), {key: one for key, one in tolerance.items() if one.trusted}
+    untrusted = tuple(key for key in tolerance if key not in known)
+    return AxisFile(source.file, spec, *origins, source, tuple(overrides), changes, known, untrusted)
 
 
 def _method_of(source: Source, overrides: Sequence[str], changes: dict[str, Any]) -> Method[Any]:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from detent.kernel.registers import Registers
+    from detent.methods.batch import Batch
     from detent.methods.linear import LinearModel
     from detent.methods.position import PositionSensor
     from detent.methods.tuning import Ensemble, Tuning
@@ -241,6 +242,12 @@ class Method(Protocol[SpecT]):
     """Place of what chooses its gains: ``tuning(spec)`` gives a `tuning.Tuning`; none where it has no gains."""
     stands: ClassVar[str] = ""
     """Place of what watches it at standstill: ``ensemble(spec)`` gives a `tuning.Ensemble`; none where nothing does."""
+    keeps: ClassVar[str] = ""
+    """Place of what its controller keeps where the machine is another than that of its file: ``kept(spec)`` gives
+    values by dotted key."""
+    batches: ClassVar[str] = ""
+    """Place of what makes the job on many machines of one file at once: ``Batch(file, job, keys)``, a `batch.Batch`;
+    without it each is run for itself."""
     compares: ClassVar[tuple[str, ...]] = ()
     """Places of what holds it beside its alternatives: ``compare(spec, progress=)``."""
 
@@ -408,6 +415,14 @@ class Method(Protocol[SpecT]):
                 "expected: a method that brings its starts, such as cascade; try: see how moves end with `detent run`"
             )
         return self.brought(self.stands)(spec)
+
+    def kept(self, spec: SpecT) -> dict[str, Any]:
+        """What its controller keeps where the machine is another than that of its file, by key; nothing by default."""
+        return self.brought(self.keeps)(spec) if self.keeps else {}
+
+    def batch(self, file: Any, job: Any, keys: Sequence[str]) -> "Batch | None":
+        """What makes a job on many machines that differ in these keys; None where each is run for itself."""
+        return self.brought(self.batches)(file, job, keys) if self.batches else None
 
     def sensors(self, spec: SpecT) -> "Mapping[str, PositionSensor]":
         """What counts the position of each of its motors; of a single one by the name ""."""

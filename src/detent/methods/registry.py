@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import Any, cast
 
 from detent.errors import DetentError
 from detent.methods.method import Method
@@ -23,9 +23,10 @@ class Methods(Mapping[str, Method[Any]]):
 
     def __getitem__(self, name: str) -> Method[Any]:
         found = self.known[name]
-        if isinstance(found, EntryPoint):
-            found = self.known[name] = _loaded(found)
-        return found
+        # An `EntryPoint`, or one of the package importlib_metadata, which takes the place of the standard library's.
+        if hasattr(found, "group"):
+            found = self.known[name] = _loaded(cast("EntryPoint", found))
+        return cast("Method[Any]", found)
 
     def usable(self) -> list[Method[Any]]:
         """Those that can be loaded; what keeps the others from it is in `refused`."""

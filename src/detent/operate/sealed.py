@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 from weakref import WeakValueDictionary
 
 from detent.errors import DetentError, DiskError
+from detent.files.text import sync_folder
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -316,21 +317,12 @@ def set_aside(path: Path, stamp: str) -> Path:
         if _is_hot(path):
             _journal(path).rename(_journal(kept))
         path.rename(kept)
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
     except OSError as error:
         raise DiskError(
             f"{path}: cannot be kept aside ({error.strerror or error}); make its folder writable, or rename it yourself"
         ) from error
     return kept
-
-
-def _sync_folder(folder: Path) -> None:
-    with suppress(PermissionError):  # Windows opens no folders
-        opened = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(opened)
-        finally:
-            os.close(opened)
 
 
 def _journal(path: Path) -> Path:

@@ -1,5 +1,7 @@
 """What every run notes, whichever axis made it, and how a run is judged by what its own controller saw."""
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, Literal, TypeVar
 
@@ -20,6 +22,11 @@ EDGE = 0.9  # share of the window from which an error at rest is at its edge
 JobT = TypeVar("JobT")
 
 
+def largest(values: Sequence[float]) -> float:
+    """The largest of some magnitudes; NaN where there is none, or one is NaN."""
+    return math.nan if not values or any(map(math.isnan, values)) else max(values)
+
+
 @dataclass(repr=False)
 class RunRecord(OnScreen, Generic[JobT]):
     """Outcome of a job; each method adds what its runs have beside. Times since power-on [s]."""
@@ -34,6 +41,12 @@ class RunRecord(OnScreen, Generic[JobT]):
 
     told: ClassVar[tuple[str, ...]] = ()
     """Names of the figures that `to_dict` gives beside these."""
+    measured: ClassVar[Mapping[str, str]] = {}
+    """Figures of the whole run that are numbers, and their units: what a tolerance may be asked of."""
+    measured_moves: ClassVar[Mapping[str, str]] = {}
+    """The same of each of its `moves`; of the run, the largest magnitude."""
+    kept_by: ClassVar[Mapping[str, str]] = {}
+    """Of such figures, the key of the axis file that says how large they may be."""
 
     @property
     def level(self) -> Level:
@@ -46,6 +59,16 @@ class RunRecord(OnScreen, Generic[JobT]):
     def doubt(self) -> str:
         """What happened, of the first warning; empty without one."""
         return self.warnings[0].partition(";")[0].rstrip(".") if self.warnings else ""
+
+    def figures(self) -> dict[str, float]:
+        """What was measured, by name; `done` is 1 or 0, and of a run that failed there is nothing else: NaN."""
+        moves: list[Any] = getattr(self, "moves", []) if self.measured_moves else []
+        found = {name: [abs(float(getattr(move, name))) for move in moves] for name in self.measured_moves}
+        told = {name: float(getattr(self, name)) for name in self.measured}
+        told |= {name: largest(each) for name, each in found.items()}
+        if len(moves) > 1:
+            told |= {f"move {k} {name}": value for name, each in found.items() for k, value in enumerate(each, 1)}
+        return {"done": float(self.done)} | (told if self.done else dict.fromkeys(told, math.nan))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""

@@ -6,8 +6,8 @@ controllers"), with a look at plants that the choice has not seen at the end.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
 
+from detent.axisfile.tolerance import value_of
 from detent.methods.method import untold
 from detent.methods.tuning import Bounds, Tuning
 from detent.tune.plants import CORNERS, HYPERCUBE, Plants, Variant
@@ -105,11 +105,3 @@ class Chooser:
             tried = replace(self, plants=Plants(self.plants.spec, self.plants.tolerance | {key: narrow}))
             found.append((key, tried.worth(tried.guaranteed(fresh=0))))
         return sorted(found, key=lambda pair: -pair[1])
-
-
-def value_of(spec: Any, key: str) -> float:
-    """Value of a dotted key."""
-    at: Any = spec
-    for part in key.split("."):
-        at = cast("Any", at)[part] if isinstance(at, dict) else getattr(at, part)
-    return float(at)

@@ -288,7 +288,7 @@ def tune(  # noqa: PLR0913 - what may be asked
     nominal = chooser.nominal()
     found = chooser.guaranteed() if file.tolerance and nominal.values else nominal
     worth = tuning.worth(tuning.stated), chooser.worth(nominal), chooser.worth(found)
-    refusals = list(_refusals(chooser, nominal, found))
+    refusals = [*_unknown(file), *_refusals(chooser, nominal, found)]
     values = (nominal if refusals else found).values
     job = method.trial_job(spec) if job is None else job
     progress(0.85, "trying the gains of the file")
@@ -328,6 +328,16 @@ def _typed(spec: AxisSpec, values: Mapping[str, float]) -> dict[str, float]:
     """Values of keys, whole where the key is."""
     whole = {dotted(path) for path, field, _ in held_leaves(spec) if type_of(field) is int}
     return {key: round(value) if key in whole else value for key, value in values.items()}
+
+
+def _unknown(file: AxisFile) -> Iterator[Caution]:
+    """What a recording was to tell of the plant, and did not."""
+    if file.untrusted:
+        yield Caution(
+            "plant", f"{', '.join(file.untrusted)} not trusted", "an interval of each in [tolerance]",
+            "nobody knows for which plants the gains hold",
+            "record what `detent identify --job FILE` writes, or state the interval by hand",
+        )  # fmt: skip
 
 
 def _refusals(chooser: Chooser, nominal: Guaranteed, found: Guaranteed) -> Iterator[Caution]:

@@ -103,3 +103,14 @@ def test_a_whole_number_stays_one():
     told = axis.tune()
     assert told.typed["method.scale"] == 4
     assert isinstance(told.typed["method.scale"], int)
+
+
+@pytest.mark.compiled
+def test_gains_for_a_plant_that_nobody_knows_are_refused(tmp_path):
+    made = tmp_path / "slide.toml"
+    made.write_text(f'{CASCADE.read_text()}\n[tolerance]\n"mechanics.load_mass" = "not trusted"\n')
+    told = detent.load(made).tune()
+    assert not told.done
+    assert told.values
+    assert told.refusals[0].value == "mechanics.load_mass not trusted"
+    assert "identify --job" in told.refusals[0].remedy

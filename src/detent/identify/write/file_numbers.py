@@ -40,6 +40,9 @@ class Number:
     unit: str  # SI unit
     note: str  # its interval and where it comes from
     trusted: bool = True  # False where the identification refused it
+    name: str = ""  # of the constant it comes from; empty where it is a choice
+    low: float = math.nan  # and high: ends of its 95 % interval, as the value
+    high: float = math.nan
 
     @property
     def text(self) -> str:
@@ -172,7 +175,7 @@ class FileNumbers:
             period = run.step if base is None else base.method.sample_period
             samples = round(self._value("delay") / period) - (0 if base is None else base.encoder.delay)
             within, text = float(min(max(samples, 0), MOST_SAMPLES)), f"samples of {format_quantity(period, 's')}; "
-            yield self._make("drive.delay", within, "", "delay", text)
+            yield self._make("drive.delay", within, "", "delay", text, period)
         yield self._mass()
         if "pendulum" in self._known:
             weight = math.hypot(self._value("pendulum"), self._value("pendulum.across"))
@@ -199,8 +202,13 @@ class FileNumbers:
     def _value(self, name: str) -> float:
         return self._known[name].value if name in self._known else 0.0
 
-    def _make(self, key: str, value: float, linear: str, name: str, text: str = "") -> Number:
-        return Number(key, value, self._unit(linear), f"{text}{self.interval(name)}", name in self._trusted)
+    def _make(  # noqa: PLR0913 - a number, its constant, and the samples that a delay is counted in
+        self, key: str, value: float, linear: str, name: str, text: str = "", period: float = 0.0
+    ) -> Number:
+        found, scale = self._known[name], 1.0 / period if period else 1.0
+        low, high = (value + scale * (end - found.value) for end in (found.low, found.high))
+        note, trusted = f"{text}{self.interval(name)}", name in self._trusted
+        return Number(key, value, self._unit(linear), note, trusted, name, low, high)
 
     def _mass(self) -> Number:
         base, total = self._base, self._value("mass")
@@ -271,8 +279,8 @@ class FileNumbers:
         yield self._make(f"{table}.static", coulomb + max(excess, 0.0), "N", name, text)
         if "stribeck" in self._known:
             trusted = {name, "stribeck"} <= self._trusted and self._known["stribeck"].low > 0.0
-            note = self.interval("stribeck")
-            yield Number(f"{table}.stribeck", max(self._value("stribeck"), 0.0), self._unit("m/s"), note, trusted)
+            found = self._make(f"{table}.stribeck", max(self._value("stribeck"), 0.0), "m/s", "stribeck")
+            yield replace(found, trusted=trusted)
 
 
 def plain(name: str) -> str:

@@ -15,12 +15,15 @@ from typing import Any
 
 from detent.axisfile.motion import unit_in
 from detent.errors import AxisError, DetentError
+from detent.files.fields import held_leaves
 from detent.files.patch import Change, NewValue, patch
+from detent.files.problems import dotted
 from detent.files.source import parse_source
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.loop_fit import Loops, fit_loops
 from detent.identify.fit.verdict import Refusal
 from detent.identify.write.file_numbers import NATIVE, Bounds, FileNumbers, Number, grid_of, outwards, plain, see
+from detent.identify.write.intervals import tolerance_values
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec
 from detent.methods.load import axis_of
 from detent.units import format_quantity
@@ -47,6 +50,8 @@ def axis_toml(found: Identification, base: str | None = None, file: str = "axis 
     if base is not None:
         return patched_axis(found, base, file)[0]
     made = _whole_file(found, reading)
+    spec = cascade_spec(made, file)
+    made, _ = patch(made, _tolerances(found, list(FileNumbers(found).numbers()), made, spec), file)
     axis_of(parse_source(file, made))
     return made
 
@@ -54,10 +59,17 @@ def axis_toml(found: Identification, base: str | None = None, file: str = "axis 
 def patched_axis(found: Identification, base: str, file: str) -> tuple[str, list[Change]]:
     """Put what was identified and is trusted into an axis file."""
     _refuse_untrusted(found)
-    numbers = [n for n in FileNumbers(found, cascade_spec(base, file)).numbers() if n.trusted]
-    made, changes = patch(base, [NewValue(n.key, n.value, n.unit, n.note) for n in numbers], file)
+    spec = cascade_spec(base, file)
+    numbers = list(FileNumbers(found, spec).numbers())
+    values = [NewValue(n.key, n.value, n.unit, n.note) for n in numbers if n.trusted]
+    made, changes = patch(base, values + _tolerances(found, numbers, base, spec), file)
     cascade_spec(made, file)
     return made, changes
+
+
+def _tolerances(found: Identification, numbers: list[Number], text: str, spec: CascadeSpec) -> list[NewValue]:
+    held = {dotted(path) for path, _, value in held_leaves(spec) if isinstance(value, int | float)}
+    return tolerance_values(numbers, found.constants, text.removeprefix("\ufeff"), held)
 
 
 def _refuse_untrusted(found: Identification) -> None:

@@ -1,7 +1,7 @@
 """A list of moves on a simulated cascade axis, from power-on: what its drive sees, and an observer beside the load."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -49,6 +49,7 @@ class CascadeMove:
     overshoot: float  #: how far the load went beyond the target, 0 if it did not
     peak_speed: float  #: largest speed of the load [m/s]
     peak_following: float  #: largest magnitude of the position loop's error
+    peak_after: float  #: the same after the end of the reference; NaN if the drive went off before
     peak_command: float  #: largest magnitude of the command [V]
     limited: float  #: time with the command at its limit [s]
     in_position: bool  #: the axis was in position in time
@@ -86,6 +87,14 @@ class CascadeRun(RunRecord[MoveJob]):
     told: ClassVar[tuple[str, ...]] = (
         "time_off", "tolerance", "max_command", "worst_following", "worst_error", "worst_overshoot",
     )  # fmt: skip
+    measured: ClassVar[Mapping[str, str]] = {"time_end": "s"}
+    measured_moves: ClassVar[Mapping[str, str]] = {
+        "peak_following": "m", "peak_after": "m", "error": "m", "settling": "s", "approach": "s", "overshoot": "m",
+        "peak_command": "V", "limited": "s", "peak_speed": "m/s",
+    }  # fmt: skip
+    kept_by: ClassVar[Mapping[str, str]] = {
+        "peak_following": "method.following_error", "error": "method.in_position",
+    }  # fmt: skip
 
     @property
     def seconds(self) -> float:
@@ -161,11 +170,16 @@ def _make_move(  # noqa: PLR0913 - a move, who makes it, and who judges
     set_gauge(gauge, host.state.tick, start, target, result.tolerance)
     host.follow(profile)
     event = host.pass_samples(profile.count - 1)
+    following, after = peaks.following, math.nan
     if not event:
+        peaks.following = 0.0
         arrived, event = host.time, _arrive(host)
     if event == ARRIVED:
         ready = host.time
         event = _stand(host, evidence, move) if move.dwell > 0 else 0
+    if not math.isnan(arrived):
+        after = peaks.following
+        following = max(following, after)
     evidence.take()
     if event != FAULT:
         evidence.take_error(f"move {move.number}", target - load.position)
@@ -182,7 +196,8 @@ def _make_move(  # noqa: PLR0913 - a move, who makes it, and who judges
         position=load.position,
         overshoot=max(float(gauge.beyond), 0.0),
         peak_speed=float(gauge.peak_speed),
-        peak_following=peaks.following,
+        peak_following=following,
+        peak_after=after,
         peak_command=peaks.command,
         limited=peaks.limited * host.period,
         in_position=not math.isnan(ready),

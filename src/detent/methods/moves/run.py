@@ -6,7 +6,7 @@ the axis stands at after power-on is known to it (a home sensor tells it in a ma
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -196,6 +196,10 @@ class MoveRun(RunRecord[MoveJob]):
     told: ClassVar[tuple[str, ...]] = (
         "tolerance", "grid", "peak_current", "energy", "faults", "worst_error", "worst_overshoot", "moves_per_second",
     )  # fmt: skip
+    measured: ClassVar[Mapping[str, str]] = {"peak_current": "A", "energy": "J", "time_end": "s"}
+    measured_moves: ClassVar[Mapping[str, str]] = {
+        "error": "m", "settling": "s", "approach": "s", "overshoot": "m", "early": "s", "peak_speed": "m/s",
+    }  # fmt: skip
 
     @property
     def worst_error(self) -> float:

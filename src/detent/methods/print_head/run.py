@@ -6,6 +6,7 @@ next line while the present one prints.
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -163,6 +164,9 @@ class PrintRun(RunRecord[PrintJob]):
         "print_time", "characters", "characters_per_second", "columns", "missed", "worst_error", "rms_error",
         "turn_arounds", "repositions", "peak_current", "energy", "width",
     )  # fmt: skip
+    measured: ClassVar[Mapping[str, str]] = {
+        "worst_error": "m", "rms_error": "m", "print_time": "s", "peak_current": "A", "energy": "J",
+    }  # fmt: skip
 
     @property
     def print_time(self) -> float:

@@ -1,7 +1,7 @@
 """A sequence on a simulated rotary table, from power-on: what an observer beside the table sees."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -80,6 +80,7 @@ class SequenceRun(RunRecord[SequenceJob]):
         "count", "in_position", "travel", "turns", "crossings", "rollovers", "position", "refused", "peak_deviation",
         "worst_error",
     )  # fmt: skip
+    measured: ClassVar[Mapping[str, str]] = {"worst_error": "rad", "peak_deviation": "", "time_end": "s"}
 
     @property
     def peak_deviation(self) -> float:

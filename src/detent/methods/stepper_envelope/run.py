@@ -1,6 +1,6 @@
 """A job on a simulated stepper stage, from power-on: what its host commands, and what an observer of rotors sees."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -122,6 +122,7 @@ class StageRun(RunRecord[StageJob]):
     lost: dict[str, int] = field(default_factory=dict[str, int])
 
     told: ClassVar[tuple[str, ...]] = ("lost", "worst_lag", "least_margin", "moves_per_second")
+    measured: ClassVar[Mapping[str, str]] = {"worst_lag": "", "least_margin": "", "time_end": "s"}
 
     @property
     def made(self) -> list[tuple[StageMoveRecord, str, MotorMove]]:

@@ -1,0 +1,230 @@
+"""The cases of a tolerance run: which question is asked, and which values case number i has.
+
+The value of a key in case i is a function of (seed, i, key) alone: one number of Philox4x64 with the key (seed, first
+8 bytes of the SHA-256 of the key) at counter i, through the inverse of its distribution. So a case does not depend on
+how many there are, on chunks, on workers, nor on which other tolerances are stated. Case 0 is the file's.
+
+Salmon, Moraes, Dror, Shaw: Parallel random numbers: as easy as 1, 2, 3. SC11.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, is_dataclass, replace
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent import __version__
+from detent.axisfile.tolerance import TABLE, Tolerance, joint, value_of
+from detent.errors import DetentError
+from detent.files.source import parse_source
+from detent.kernel.cache import source_hash
+from detent.methods.load import AxisFile, axis_of
+from detent.methods.method import Method
+from detent.methods.registry import METHODS
+
+Numbers = NDArray[np.float64]
+
+WORDS = 4  # numbers that a counter of Philox4x64 gives; the first is ours
+MOST_SEED = 2**64 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What a case must keep to pass: a quantity up to a value, or from it on where `least`."""
+
+    quantity: str
+    value: float  # in the unit of the quantity
+    least: bool = False
+
+    def kept(self, results: Mapping[str, Numbers]) -> NDArray[np.bool_]:
+        """Of which cases; a quantity that a case does not have is not kept."""
+        found = results[self.quantity]
+        return found >= self.value if self.least else found <= self.value
+
+    def __str__(self) -> str:
+        """As it is written after ``--limit``."""
+        return f"{self.quantity} {'>=' if self.least else '<='} {self.value:g}"
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of many machines of one axis file; plain data, so that other processes can take it.
+
+    Attributes
+    ----------
+    name, text : str
+        The axis file as the user named it, and its text.
+    overrides : tuple of str
+        Values of ``--set``.
+    changes : tuple of (str, value)
+        Values of a program over those of the file, by dotted key.
+    job : object
+        The job, as the method reads it.
+    tolerance : tuple of Tolerance
+        What is not known, in the order of the file.
+    seed : int
+        0 to 2**64 - 1.
+    limits : tuple of Limit
+        What passes.
+    margins : bool
+        Margins of the loops are quantities, too.
+    """
+
+    name: str
+    text: str
+    overrides: tuple[str, ...]
+    changes: tuple[tuple[str, Any], ...]
+    job: Any
+    tolerance: tuple[Tolerance, ...]
+    seed: int = 1
+    limits: tuple[Limit, ...] = ()
+    margins: bool = False
+
+    @classmethod
+    def of(
+        cls, file: AxisFile, job: Any, *, seed: int = 1, limits: Iterable[Limit] = (), margins: bool = False
+    ) -> "Question":
+        """What is asked of an axis file; refused where nothing of it is toleranced."""
+        if not 0 <= seed <= MOST_SEED:
+            raise DetentError(f"seed: got {seed}; expected: a whole number from 0 to {MOST_SEED}; give one of these")
+        if file.untrusted:
+            raise DetentError(
+                f"{file.file}: got {', '.join(file.untrusted)} not trusted; expected: an interval of each in "
+                "[tolerance]; record what `detent identify --job FILE` writes, or state the interval by hand"
+            )
+        if not file.tolerance:
+            raise DetentError(
+                f"{file.file}: got no table [tolerance]; expected: at least one key in it, such as "
+                '"mechanics.load_mass" = "10 %"; state what is not known of the axis'
+            )
+        text, changes = file.source.content.decode("utf-8"), tuple(_leaves(file.changes))
+        tolerance = tuple(file.tolerance.values())
+        return cls(file.file, text, file.overrides, changes, job, tolerance, seed, tuple(limits), margins)
+
+    @cached_property
+    def file(self) -> AxisFile:
+        """The axis file, read, without its tolerances: of a normal distribution some values lie outside."""
+        source = parse_source(self.name, self.text)
+        tables = {key: table for key, table in source.tables.items() if key != TABLE}
+        return axis_of(replace(source, tables=tables), self.overrides, _nested(self.changes))
+
+    @property
+    def method(self) -> Method[Any]:
+        """The control method."""
+        return METHODS[self.file.spec.axis.method]
+
+    @cached_property
+    def nominal(self) -> dict[str, float]:
+        """The file's value of every key that is toleranced."""
+        return {one.key: value_of(self.file.spec, one.key) for one in self.tolerance}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data: all that the results depend on, and what computes them."""
+        told = {name: getattr(self, name) for name in ("text", "overrides", "changes", "seed", "margins")}
+        told |= {name: [asdict(one) for one in getattr(self, name)] for name in ("tolerance", "limits")}
+        job = asdict(self.job) if is_dataclass(self.job) and not isinstance(self.job, type) else repr(self.job)
+        return told | {"job": job, "version": __version__, "steps": source_hash()}
+
+    @cached_property
+    def hash(self) -> str:
+        """Hash of all this: results of questions with the same one may be put together."""
+        return hashlib.sha256(json.dumps(self.to_dict(), sort_keys=True, default=str).encode()).hexdigest()
+
+    def variant(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """The values that make the machine of a case of the file, by key, whole where the key is.
+
+        Beside those of the case what follows from them, and what the controller keeps though the machine is another.
+        """
+        whole = {one.key for one in self.tolerance if one.whole}
+        made: dict[str, Any] = {key: round(value) if key in whole else float(value) for key, value in values.items()}
+        if not made:
+            return made
+        return made | self._static(made) | self.method.kept(self.file.spec)
+
+    def _static(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Static friction follows Coulomb friction at its ratio, where it has no tolerance of its own."""
+        found = dict[str, float]()
+        for key, value in values.items():
+            static = key.removesuffix("coulomb") + "static"
+            nominal = self.nominal[key]
+            if key.endswith(".coulomb") and static not in values and nominal > 0.0:
+                found[static] = value_of(self.file.spec, static) / nominal * value
+        return found
+
+    def machine(self, values: Mapping[str, float]) -> AxisFile:
+        """The axis file of a case; an `InputError` where it would be refused."""
+        return self.file.replaced(self.variant(values)) if values else self.file
+
+
+def _leaves(tables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tables.items():
+        if isinstance(value, Mapping) and value:
+            yield from _leaves(cast("Mapping[str, Any]", value), f"{prefix}{key}.")
+        else:
+            yield prefix + key, tuple(cast("list[Any]", value)) if isinstance(value, list) else value
+
+
+def _nested(leaves: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    from detent.files.overrides import nested
+
+    return nested(dict(leaves))
+
+
+def shares(seed: int, key: str, first: int, count: int) -> Numbers:
+    """A number above 0 and below 1 of each of some cases.
+
+    Parameters
+    ----------
+    seed : int
+        0 to 2**64 - 1.
+    key : str
+        Dotted key of the axis file.
+    first, count : int
+        The first case, and how many.
+
+    Returns
+    -------
+    ndarray of float64, shape (count,)
+        One uniform number per case, an odd multiple of 2**-54.
+    """
+    own = int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "little")
+    # numpy counts up before it gives the four words of a counter.
+    before = (first - 1) % 2 ** (64 * WORDS)
+    counter = np.array([before >> 64 * k & MOST_SEED for k in range(WORDS)], np.uint64)
+    words = np.random.Philox(counter=counter, key=np.array([seed, own], np.uint64)).random_raw(WORDS * count)[::WORDS]
+    return ((words >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
+
+
+def _at(one: Tolerance, places: Numbers) -> Numbers:
+    """`Tolerance.at` for many shares at once, to the same bits."""
+    if one.whole or one.normal:
+        return np.array([one.at(share) for share in places.tolist()], np.float64)
+    return one.low + places * (one.high - one.low)
+
+
+def draw(question: Question, first: int, count: int) -> dict[str, Numbers]:
+    """Values of every toleranced key.
+
+    Parameters
+    ----------
+    question : Question
+        Its seed and tolerances matter, nothing else.
+    first, count : int
+        The first case, and how many.
+
+    Returns
+    -------
+    dict of str to ndarray of float64, shape (count,)
+        By key, in SI units; case 0 has the values of the file.
+    """
+    found, own = dict[str, Numbers](), {one.key: one for one in question.tolerance}
+    places = joint(own, {key: shares(question.seed, key, first, count) for key in own})
+    for one in question.tolerance:
+        found[one.key] = _at(one, places[one.key])
+        if first == 0 and count:
+            found[one.key][0] = question.nominal[one.key]
+    return found

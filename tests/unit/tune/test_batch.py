@@ -1,0 +1,65 @@
+"""Chunks of cases: what is measured, and why a case failed."""
+
+import math
+import pickle
+
+import pytest
+from tests.acceptance.test_golden_bits import EXAMPLES
+
+import detent
+from detent.methods.batch import kind_of
+from detent.methods.moves.job import one_move
+from detent.tune.batch import Limit, Question, default_limits, quantities, run_chunk
+
+
+def filtered(folder, tolerance: str):
+    file = folder / "servo.toml"
+    text = (EXAMPLES / "filtered_servo.toml").read_text(encoding="utf-8")
+    file.write_text(f"{text}\n[tolerance]\n{tolerance}\n", encoding="utf-8")
+    axis = detent.load(file)
+    return Question.of(axis.file, one_move("short", 0.001, 0.0))
+
+
+def test_a_chunk_is_what_each_machine_does(tmp_path):
+    asked = filtered(tmp_path, '"drive.current_per_count" = ["35 mA", "60 mA"]')
+    asked = pickle.loads(pickle.dumps(asked))  # noqa: S301 - our own
+    chunk = run_chunk(asked, 0, 3)
+    names = {one.name: one for one in quantities(asked)}
+    assert list(chunk.results) == list(names)
+    assert names["settling"].unit == "s"
+    assert "approach" not in names  # an axis of one mode has none
+    for k in range(3):
+        values = {key: each[k] for key, each in chunk.values.items()} if k else {}
+        done = asked.method.run(asked.machine(values).spec, asked.job)
+        assert chunk.results["settling"][k] == done.moves[0].settling
+        assert chunk.results["done"][k] == float(done.done)
+    assert chunk.count == 3
+    assert chunk.reason.tolist() == ["", "", ""]
+
+
+def test_what_the_file_would_refuse_is_a_failed_case(tmp_path):
+    text = '"mechanics.friction.right.static" = ["2 N", "60 N"]\n"mechanics.friction.right.coulomb" = ["1 N", "59 N"]'
+    asked = filtered(tmp_path, text)
+    chunk = run_chunk(asked, 0, 12)
+    coulomb, static = (chunk.values[f"mechanics.friction.right.{key}"] for key in ("coulomb", "static"))
+    refused = coulomb > static
+    assert 0 < refused.sum() < 12
+    for k in range(12):
+        if refused[k]:
+            assert "mechanics.friction.right.static" in chunk.reason[k]
+            assert chunk.results["done"][k] == 0.0
+            assert math.isnan(chunk.results["settling"][k])
+
+
+def test_default_limits_are_those_of_the_file(tmp_path):
+    asked = filtered(tmp_path, '"drive.current_per_count" = ["35 mA", "60 mA"]')
+    assert default_limits(asked) == (Limit("done", 1.0, least=True),)
+
+
+@pytest.mark.parametrize(
+    ("failure", "kind"),
+    [("move 3 to 0.5 m: did not arrive within 2 s; it is at rest", "did not arrive within ..."),
+     ("after power-on: the axis ran faster than 1.1 x 0.5 m/s, and", "the axis ran faster than ... ...")],
+)  # fmt: skip
+def test_kinds_of_failures_hold_no_values(failure, kind):
+    assert kind_of(failure) == kind
