@@ -141,10 +141,15 @@ GUARD_TEXT: dict[int, str] = {
 
 # ---- faults of a live axis that no guard of a controller sees
 DRIVE_FAULT, DRIVE_LOST, LOOP_OVERRUN, LOOP_DEAD, OTHER_HARDWARE = 24, 40, 50, 51, 70
+SENSOR_LOST, OVER_CURRENT, MOTOR_LOAD = 1, 20, 21  # a drive has found them; of 1 and 21 a guard may know, too
 NO_MARK = 55  # refusal of a motion that a power cut would make a riddle of
 NOT_AT_REST, NOTHING_TO_UNDO = 111, 112  # refusals of what is asked of a position table
 
 REFUSAL_TEXT: dict[int, str] = {
+    1: "the encoder is not heard; check its cable and supply, reset, and find the reference anew",
+    20: "the drive has switched off for a current too large, or a short; check motor and cable with the supply off, "
+    "then reset",
+    21: "the motor has had more than it bears for ever, for too long; let it cool, then reset, and ask less of it",
     24: "the drive tells a fault of its own, or has left its operation by itself; read its error code, mend that, then "
     "reset",
     31: "the target lies beyond a soft limit; name one between the limits",

@@ -20,7 +20,7 @@ class Rule(NamedTuple):
 
 
 RULES = {
-    1: Rule(TORQUE_OFF, "E"), 2: Rule(TORQUE_OFF, "H"), 3: Rule(TORQUE_OFF, "H"), 4: Rule(TORQUE_OFF, "H"),
+    1: Rule(TORQUE_OFF, "H"), 2: Rule(TORQUE_OFF, "H"), 3: Rule(TORQUE_OFF, "H"), 4: Rule(TORQUE_OFF, "H"),
     5: Rule(RAMP_OFF, "H"), 6: Rule(RAMP_OFF, "H"), 7: Rule(REFUSE, "H"),
     10: Rule(RAMP_OFF, "E"), 11: Rule(RAMP_OFF, "E"), 12: Rule(TORQUE_OFF, "H"), 13: Rule(RAMP_HOLD, "A"),
     14: Rule(RAMP_OFF, "E"),
@@ -33,9 +33,9 @@ RULES = {
     60: Rule(REFUSE, "C"), 61: Rule(REFUSE, ""), 62: Rule(REFUSE, "H"), 63: Rule(WARN, "A"), 64: Rule(REFUSE, "H"),
     65: Rule(REFUSE, "H"), 66: Rule(REFUSE, "C"), 67: Rule(REFUSE, "H"),
 }  # fmt: skip
-"""By the number of the fault. After a sensor that seems to count the wrong way round, or too fast (4, 12), nobody knows
-where the axis is, and so it has to find its reference anew. A number that is not here, of a method's own electronics,
-has taken the torque away."""
+"""By the number of the fault. An encoder that was not heard (1) may have counted on unseen, and one that seems to count
+the wrong way round, or too fast (4, 12), tells nobody where the axis is: its reference has to be found anew. A number
+that is not here, of a method's own electronics, has taken the torque away."""
 
 IN_MOTION = 60  # numbers below: faults of an axis; above: of files and tables
 LOSES = sum(1 << code for code, rule in RULES.items() if code < IN_MOTION and rule.recovery == "H")

@@ -17,7 +17,16 @@ import detent
 from detent.control import operation as ops
 from detent.control.axis_states import ENABLED, FAULT, FAULT_REACTION, READY, STATE_NAMES, SWITCH_ON_DISABLED, ordered
 from detent.control.operation import UNREADY, Operation
-from detent.errors import DRIVE_FAULT, DRIVE_LOST, OTHER_HARDWARE, AxisError, DetentError
+from detent.errors import (
+    DRIVE_FAULT,
+    DRIVE_LOST,
+    MOTOR_LOAD,
+    OTHER_HARDWARE,
+    OVER_CURRENT,
+    SENSOR_LOST,
+    AxisError,
+    DetentError,
+)
 from detent.methods.cascade.controller import CascadeLines
 from detent.operate.drivers import cia402
 from detent.operate.drivers.canopen_drive import CanopenDrive, read_address
@@ -239,17 +248,19 @@ def test_another_drive_is_barred_and_both_are_named(wanted):
         wired.link.close()
 
 
-def test_a_fault_of_the_drive_is_told_and_reset_only_when_the_axis_was():
+@pytest.mark.parametrize(("error", "code"), [(0x2310, OVER_CURRENT), (0x2350, MOTOR_LOAD), (0x7305, SENSOR_LOST),
+                                              (0x4210, DRIVE_FAULT)])  # fmt: skip
+def test_a_fault_of_the_drive_is_told_and_reset_only_when_the_axis_was(error, code):
     with live_drive.still_drive("fault", identity=live_drive.IDENTITY) as drive:
         wired = Wired(drive, "fault")
         wired.go(4)
         wired.go(6, enable=1)
-        drive.fail(0x2310)
+        drive.fail(error)
         wired.go(2)
-        assert (wired.loop.operation.fault, wired.loop.operation.state) == (DRIVE_FAULT, FAULT_REACTION)
+        assert (wired.loop.operation.fault, wired.loop.operation.state) == (code, FAULT_REACTION)
         wired.loop.operation.state = FAULT
         wired.go(10, enable=0)
-        assert (drive.state, drive.error) == (FAULT, 0x2310)
+        assert (drive.state, drive.error) == (FAULT, error)
         wired.loop.operation.state = SWITCH_ON_DISABLED
         wired.go(6)
         assert (drive.state, drive.error, wired.loop.operation.barred) == (READY, 0, 0)

@@ -25,7 +25,7 @@ from detent.control.axis_states import (
     SWITCH_ON_DISABLED,
     SWITCHED_ON,
 )
-from detent.errors import DRIVE_FAULT, AxisError, DetentError
+from detent.errors import AxisError, DetentError
 from detent.methods.method import Wiring
 from detent.operate.drivers import cia402 as c
 from detent.operate.drivers.driver import Fact, put
@@ -70,7 +70,7 @@ class CanopenDrive:
         self._network: Any = canopen.Network()
         self._network.NOTIFIER_CYCLE = LOOK
         self._answer, self._data = threading.Event(), b""
-        self._state = self._count = self._exchanges = 0
+        self._state = self._count = self._exchanges = self._error = 0
         self._enabled, self._beat = False, 0.0
 
     # ---- beginning
@@ -167,7 +167,7 @@ class CanopenDrive:
         if not self._answer.wait(self._wait):
             return False
         self._answer.clear()
-        word, count, _ = struct.unpack("<HiH", self._data)
+        word, count, self._error = struct.unpack("<HiH", self._data)
         self._state = c.state_of(word)
         self._count += (count - self._count + SPAN // 2) % SPAN - SPAN // 2
         put(lines, self._wiring.position, self._count)
@@ -179,7 +179,7 @@ class CanopenDrive:
         self.ready = self._state in (READY, SWITCHED_ON, ENABLED)
         self._enabled = enable and (self._enabled or self._state == ENABLED)
         left = self._enabled and self._state != ENABLED
-        self.fault = DRIVE_FAULT if left or self._state in (FAULT, FAULT_REACTION) else 0
+        self.fault = c.fault_of(self._error) if left or self._state in (FAULT, FAULT_REACTION) else 0
 
     def write(self, lines: Any, *, reset: bool) -> None:
         """Controlword and torque, then the SYNC."""

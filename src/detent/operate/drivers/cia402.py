@@ -25,6 +25,7 @@ from detent.control.axis_states import (
     SWITCH_ON_DISABLED,
     SWITCHED_ON,
 )
+from detent.errors import DRIVE_FAULT, MOTOR_LOAD, OVER_CURRENT, SENSOR_LOST
 
 CONTROL, STATUS, ERROR_CODE = 0x6040, 0x6041, 0x603F
 MODE, MODE_SHOWN, MODES = 0x6060, 0x6061, 0x6502
@@ -136,6 +137,21 @@ def state_of(word: int) -> int:
     (4, 7)
     """
     return next((state for state, mask in _MASKS.items() if word & mask == WORDS[state]), NOT_READY)
+
+
+# Error codes (603F) by the ranges of IEC 61800-7-201, annex: the narrower before the wider.
+_FAULTS = (
+    (0x2350, 0x2351, MOTOR_LOAD), (0x2000, 0x23FF, OVER_CURRENT), (0x7300, 0x73FF, SENSOR_LOST),
+)  # fmt: skip
+
+
+def fault_of(error: int) -> int:
+    """The number that the table of faults has for an error code of a drive; what it has none for is the drive's own.
+
+    >>> fault_of(0x2320), fault_of(0x2350), fault_of(0x7305), fault_of(0x8130)
+    (20, 21, 1, 24)
+    """
+    return next((fault for first, last, fault in _FAULTS if first <= error <= last), DRIVE_FAULT)
 
 
 def orders_of(word: int, state: int) -> tuple[int, ...]:
