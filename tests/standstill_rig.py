@@ -1,4 +1,4 @@
-"""Axes at standstill: the packaged cascade example with its gains by hand, and what the tune specification calls the rigid one."""
+"""Axes at standstill: the cascade example with its gains by hand, and what the tune specification calls rigid."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -353,6 +353,8 @@ def test_28_check_cautions_the_gains_by_hand_and_not_those_of_tune():
     found = by_hand_too.tune().values
     stated = CascadeTuning(detent.load(CASCADE).spec).stated
     assert found == stated  # the packaged example has the gains of tune, all three digits
+
+
 # ---- hunting
 
 
@@ -486,6 +488,8 @@ def test_20_a_knock_starts_what_friction_holds():
     assert 5e-6 <= slow.swing("motor") <= 10e-6
     assert 1.0 <= slow.period <= 8.0
     assert {kind.name for kind in stands(example("method.velocity_gain=340 V*s/m")).kinds} == {"stick-slip"}
+
+
 # ---- tolerance
 
 
