@@ -88,19 +88,23 @@ bench-smoke: venv-test ## run every benchmark once, without measuring
 	$(PYTEST) -m bench tests/bench --benchmark-disable $(PYTEST_ARGS)
 
 # Compiled code is invisible to coverage: the tests of the steps run as plain Python, but for those that simulate too
-# long; then all run compiled, as in `make test`. Two processes at the same time, with about as much to do. Coverage
-# slows Python down: what tests/property draws a hundred times reaches few lines that the unit tests do not.
-STEPS    := $(addprefix tests/unit/,control drive kernel planning plant sensing) \
-            $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py plant.py system*.py))
+# long; all others run compiled, as in `make test`, and with them the panel's of the specification. Two processes at the
+# same time, with about as much to do. Coverage slows Python down: what tests/property draws a hundred times reaches
+# few lines that the unit tests do not.
+BLOCKS   := $(addprefix tests/unit/,control drive planning plant sensing)
+STEPS    := $(BLOCKS) $(addprefix tests/unit/,kernel $(addprefix operate/test_,drivers.py loop.py watchdog.py)) \
+            $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py live.py plant.py system*.py))
 WHOLE    := tests/unit/methods tests/unit/identify
+PANEL    := _49_ or _50_ or _51_ or _52_ or _53_
 SEEN     := not long and not wide and not bench and not process
 COVER    := $(BIN)/python -m coverage run -m pytest $(PYTEST_ARGS)
 coverage: venv-test ## which lines and branches the unit tests reach
 	COVERAGE_FILE=.coverage.whole $(COVER) -m "$(SEEN)" $(WHOLE) & whole=$$!; \
 	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.steps $(COVER) -m "$(SEEN) and not compiled" $(STEPS); steps=$$?; \
-	COVERAGE_FILE=.coverage.rest $(COVER) -m "$(SEEN)" tests/unit $(addprefix --ignore=,$(WHOLE)); rest=$$?; \
-	wait $$whole && test $$steps = 0 && test $$rest = 0
-	$(BIN)/python -m coverage combine .coverage.whole .coverage.steps .coverage.rest
+	COVERAGE_FILE=.coverage.rest $(COVER) -m "$(SEEN)" tests/unit $(addprefix --ignore=,$(WHOLE) $(BLOCKS)); rest=$$?; \
+	COVERAGE_FILE=.coverage.panel $(COVER) -m "$(SEEN)" -k "$(PANEL)" tests/acceptance/test_live.py; panel=$$?; \
+	wait $$whole && test $$steps = 0 && test $$rest = 0 && test $$panel = 0
+	$(BIN)/python -m coverage combine .coverage.whole .coverage.steps .coverage.rest .coverage.panel
 	$(BIN)/python -m coverage report
 
 lint: venv-dev ## ruff: rules and layout

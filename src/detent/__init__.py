@@ -11,23 +11,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from detent.axis import Axis, Run, Timing, load, load_trace
+    from detent.axis import Axis, load
     from detent.errors import DetentError, InputError
     from detent.identify.analysed import Analysed, analyse
     from detent.identify.identified import Identified, identify_axis
     from detent.operate.client import LiveAxis
     from detent.operate.start import connect, live
+    from detent.record.trace_files import load_trace
+    from detent.runs import Run, Timing
     from detent.tune.tuned import Tuned
 
 __version__ = "0.1.0"
 
 _PLACES = {
-    "detent.axis": ("Axis", "Run", "Timing", "load", "load_trace"),
+    "detent.axis": ("Axis", "load"),
     "detent.errors": ("DetentError", "InputError"),
     "detent.identify.analysed": ("Analysed", "analyse"),
     "detent.identify.identified": ("Identified", "identify_axis"),
     "detent.operate.start": ("connect", "live"),
     "detent.operate.client": ("LiveAxis",),
+    "detent.record.trace_files": ("load_trace",),
+    "detent.runs": ("Run", "Timing"),
     "detent.tune.tuned": ("Tuned",),
 }
 """Where the words of the API stand; each loads at its first use: `import detent` and `detent --help` stay quick."""

@@ -53,3 +53,16 @@ def test_sections_stand_only_where_they_are_published(path):
     module = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
     found = [(module, name) for name in sections(ast.parse(path.read_text(encoding="utf-8")))]
     assert [name for name in found if name not in PUBLISHED] == []
+
+
+BRIEF = 6
+"""Lines of a function inside another one that the other one's docstring may speak for."""
+
+
+@pytest.mark.parametrize("path", sorted(SOURCES.rglob("*.py")), ids=lambda path: path.stem)
+def test_a_function_inside_another_has_a_docstring_too(path):
+    """Ruff asks it only of what others can import."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    functions = [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef)]
+    without = [one for one in functions if not one.name.startswith("_") and ast.get_docstring(one) is None]
+    assert [one.name for one in without if (one.end_lineno or one.lineno) - one.lineno >= BRIEF] == []

@@ -34,7 +34,8 @@ def timing(
     as_json: Json = False,
 ) -> None:
     """Plot the clocked signals of the axis, every clock of a short interval, and write them as a VCD file."""
-    from detent.axis import given_as, load
+    from detent.axis import load
+    from detent.files.source import given_as
     from detent.files.text import check_target, together
     from detent.page.timing import MAX_SIGNALS
 

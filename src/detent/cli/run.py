@@ -53,8 +53,9 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run a job on the simulated axis, from power-on: print a text, make moves, run a sequence, replay a recording."""
-    from detent.axis import given_as, load
+    from detent.axis import load
     from detent.files.marks import refuse_others
+    from detent.files.source import given_as
 
     if again is not None:
         if file is not None or job is not None or replay is not None or overrides or columns or mapping is not None:

@@ -3,12 +3,13 @@
 import re
 import string
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from detent.errors import FileProblem
+from detent.errors import FileProblem, InputError
 from detent.files.locate import Index, Place, locate_keys
 from detent.files.text import decode_utf8, lines_of, read_head, refuse_longer
 
@@ -119,3 +120,15 @@ def _usual_causes(line: str, reason: str) -> Iterator[tuple[str, str]]:
     colon = re.fullmatch(r"([\w.]+)\s*:\s*(\S.*)", line)
     if colon:
         yield colon.group(1), f"write = between key and value: {colon.group(1)} = {colon.group(2)}"
+
+
+@contextmanager
+def given_as(name: str, given: object) -> Generator[None]:
+    """Tell problems of a job, which knows only the name of its file, with the path that was given."""
+    try:
+        yield
+    except InputError as error:
+        if not isinstance(given, str | Path):
+            raise
+        told = (replace(one, file=str(given)) if one.file == name else one for one in error.problems)
+        raise InputError(told) from error

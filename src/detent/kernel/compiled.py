@@ -200,6 +200,8 @@ def compiles(function: Any, gives: types.Type | Callable[[Any], Any], *kinds: An
     """
 
     def register(instructions: Any) -> Any:
+        """Tell numba the types of the function, and the instructions that stand for its call."""
+
         @templates.infer_global(function)
         class _Typing(templates.AbstractTemplate):  # pyright: ignore[reportUnusedClass] - numba keeps it
             def generic(self, args: Any, _kws: Any) -> Any:

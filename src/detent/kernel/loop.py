@@ -101,6 +101,7 @@ def _run_serve(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operati
     serve = _SERVES[q.registers]
 
     def compiled(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operation: Any, *feed: Any) -> None:  # noqa: PLR0913
+        """As `run_serve`, for numba."""
         serve(q, p, controller, lines, memory, operation, *feed)
 
     return compiled
@@ -116,6 +117,7 @@ def _run_controller(p: Any, controller: Any, lines: Any, *feed: Any) -> Any:  # 
     control = _CONTROLS[p.registers]
 
     def compiled(p: Any, controller: Any, lines: Any, *feed: Any) -> None:
+        """As `run_controller`, for numba."""
         control(p, controller, lines, *feed)
 
     return compiled
@@ -137,12 +139,14 @@ def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 
     outer, _, inner = local.partition(".")
 
     def plain(p: Any, r: Any, most: Any, *feed: Any) -> int:
+        """As `run_stretch`, for numba."""
         n = 0
         while n < most and tick(p, r, *feed):
             n += 1
         return n
 
     def on_a_copy(p: Any, r: Any, most: Any, *feed: Any) -> int:
+        """The same with one block of the plant on the stack, where the compiler keeps it in registers."""
         block = local_copy(getattr(getattr(r, outer), inner))
         n = 0
         while n < most and tick(p, r, block, *feed):
@@ -168,9 +172,11 @@ def _run_disturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> Any:  # noq
     tick: Any = _DISTURBS.get(p.registers)
 
     def undisturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> int:  # noqa: ARG001 - as above
+        """As `run_stretch`: nothing of the axis can be injected."""
         return run_stretch(p, r, most, *feed)
 
     def compiled(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> int:
+        """As `run_disturbed`, for numba."""
         n = 0
         while n < most and tick(p, r, f, *feed):
             n += 1

@@ -110,6 +110,7 @@ def operation_params(**more: Any) -> Any:
     """
 
     def make(look: float, window: float, limits: tuple[float, float], *motions: int) -> OperationParams:
+        """Fill it for a method that looks so often, has such limits and offers these motions."""
         takes = sum(1 << kind for kind in (*ops.MANAGED, *motions))
         looks = math.ceil(max(window, LEAST_WINDOW) / look - 1e-9)
         lease = math.floor(LEASE / look + 1e-9)
@@ -205,6 +206,7 @@ class Host:
         ready, missing = threading.Event(), list[str]()
 
         def loop() -> None:
+            """All periods, with what the system permits this thread."""
             missing.extend(ask_for_time())
             ready.set()
             self._run_loop(1 << 62)

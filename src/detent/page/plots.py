@@ -117,6 +117,7 @@ def _kind() -> Any:
 
     class StyledFigure(base):
         def savefig(self, fname: Any, **options: Any) -> None:
+            """Write the figure in its own style."""
             # matplotlib looks some settings up only when it writes.
             with mpl.rc_context(STYLE):
                 base.savefig(self, fname, **options)

@@ -61,6 +61,7 @@ class _Scale:
     span: float
 
     def of(self, time: Any) -> Any:
+        """Times since the begin of the diagram, in its unit."""
         return (time - self.begin) / self.unit_ps
 
 

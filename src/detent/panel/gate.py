@@ -149,6 +149,7 @@ class Gate:
 
 def _with_headers(send: Send) -> Send:
     async def with_headers(message: dict[str, Any]) -> None:
+        """Send a message; where an answer begins, with the headers that protect a page."""
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             for name, value in HEADERS.items():

@@ -248,6 +248,7 @@ class Tuned(OnScreen):
         """Plain data, as ``--json`` prints it."""
 
         def stand(one: Stand | None) -> dict[str, Any] | None:
+            """Figures of a set of gains, as data."""
             if one is None:
                 return None
             margins = {cut: {k: v if math.isfinite(v) else None for k, v in m._asdict().items()}

@@ -83,11 +83,13 @@ class Moving:
         self.host = host
         self._parts: list[Any] = [host.axis.state, host.board, host.axis.memory]
         self._held = [bytes(part) for part in self._parts]
+        self._heard = host._read, host._noted, host._pulls
 
     def go_back(self) -> None:
         """Be again as at this moment."""
         for part, held in zip(self._parts, self._held, strict=True):
             ctypes.memmove(ctypes.addressof(part), held, len(held))
+        self.host._read, self.host._noted, self.host._pulls = self._heard
 
     def after(self, periods: int, text: str = "nothing") -> bytes:
         """Machine and lines after so many periods with something wrong."""

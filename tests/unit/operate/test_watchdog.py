@@ -20,10 +20,11 @@ from tests.live_bench import Bench
 import detent
 from detent.control import operation as ops
 from detent.errors import LOOP_DEAD
+from detent.operate import watchdog
 from detent.operate.host import Ending
 from detent.operate.loop import Board
 from detent.operate.start import shared_memory
-from detent.operate.watchdog import LEAST, LOOK, PLACES, Watch
+from detent.operate.watchdog import LEAST, LOOK, PLACES, Watch, Watchdog
 
 MS = 1_000_000
 
@@ -96,6 +97,36 @@ def test_an_axis_without_torque_has_none_to_lose():
     bench.loop.found_dead += 1
     bench.host.run(1)
     assert (bench.host.state, bench.operation.fault, bench.loop.died) == ("switch on disabled", 0, 1)
+
+
+def test_it_looks_until_whoever_asked_is_gone(monkeypatch):
+    file, memory = shared_memory()
+    board: Any = Board.from_buffer(memory)
+    board.loop.patience, board.loop.alive = 1, 1  # long ago
+    answers = iter([[], [sys.stdin]])
+    monkeypatch.setattr(watchdog.select, "select", lambda *_: (next(answers), [], []))
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *_: None, raising=False)
+    kind = type(board.loop)
+    watchdog.main(file, [Board.loop.offset + getattr(kind, name).offset for name in PLACES])  # type: ignore[attr-defined]
+    os.close(file)
+    assert board.loop.found_dead == 1
+
+
+def test_one_that_has_died_has_a_successor():
+    file, memory = shared_memory()
+    board: Any = Board.from_buffer(memory)
+    board.loop.period = 10 * MS
+    made = Watchdog(board, file)
+    assert board.loop.patience == LEAST * 1e9
+    first = made.id
+    assert not made.keep()
+    made._process.kill()
+    made._process.communicate()
+    assert made.keep()
+    assert made.id != first
+    made.close()
+    os.close(file)
+    assert not is_there(made.id)
 
 
 # ---- a real one

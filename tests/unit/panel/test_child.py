@@ -6,8 +6,6 @@ import pytest
 from detent.errors import AxisError
 from detent.panel.child import Child, PanelPlace
 
-pytestmark = pytest.mark.process
-
 
 def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:

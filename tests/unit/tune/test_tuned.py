@@ -69,6 +69,25 @@ def test_a_method_without_linear_gains_says_so(name):
     assert "no linear model" in json.loads(done.stdout)["error"]
 
 
+@pytest.mark.compiled
+def test_the_command_tells_gains_and_what_it_has_written(tmp_path):
+    written = tmp_path / "new.toml"
+    done = run(str(EXAMPLES / "rotary_table.toml"), "--write", str(written))
+    assert done.exit_code == 0
+    assert f"written: {written}" in done.stdout
+    assert "method.position_gain" in done.stdout
+    again = run(str(written))
+    assert again.exit_code == 0
+    assert "written" not in again.stdout
+
+
+def test_the_command_tells_why_no_gains_do():
+    done = run(str(CASCADE), "--set", "drive.delay=60", "--hold", "method.velocity_gain")
+    assert done.exit_code == 1
+    assert "no gains keep Ms 1.7" in done.stdout
+    assert "dead time" in done.output
+
+
 def test_an_axis_that_nothing_makes_settle_is_refused():
     """A dead time of 60 samples on a velocity loop that is held."""
     told = detent.load(CASCADE, ["drive.delay=60"]).tune(hold=["method.velocity_gain"])
