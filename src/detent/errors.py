@@ -118,6 +118,17 @@ SERVO_FAULT_TEXT: dict[int, str] = {
 
 
 GUARD_TEXT: dict[int, str] = {
+    1: "the encoder sent two words within 5 ms that failed their check, or none, and the drive is off; check its "
+    "cable, shield and supply (encoder.checked)",
+    5: "the encoders of motor and load differ by more than {slip}, and the drive is off; check the coupling and both "
+    "encoders (protection.slip)",
+    14: "the axis swings about its reference by more than {swing} to either side, and the drive is off; lower the "
+    "gains, or look for play (protection.oscillation)",
+    21: "the motor has had more than motor.max_current, which it bears for ever, for too long, and the drive is off; "
+    "let it cool, and lower acceleration or duty (protection.thermal_time)",
+    30: "the axis ran onto its {side} limit switch, and the drive is off; move it away from there, and check the ends "
+    "of the travel",
+    33: "the circuits of both limit switches are open, and the drive is off; check the wire that they share",
     2: "the sensor did not move although the effort exceeded breakaway for {stuck}, and the drive is off; "
     "check for a blocked axis, a loose coupling or a broken sensor cable (protection.stuck_time, "
     "protection.stuck_effort)",

@@ -1601,6 +1601,10 @@ SAMPLE = [  # of the matrix: place, kind, state; what is found, after how long a
     ("cascade", "drive", "stuck", "move", "F12", 0.07, False),
     ("cascade", "load", "blocked", "stop", "F02", 0.06, False),
     ("cascade", "load", "blocked", "rest", "nothing", 0.0, True),
+    ("equipped", "encoder link", "intermittent", "move", "F01", 0.002, False),
+    ("equipped", "load encoder", "stuck", "move", "F05", 0.1, False),
+    ("equipped", "upper switch", "off", "move", "F30", 0.002, True),
+    ("equipped", "both switches", "off", "rest", "F33", 0.002, True),
     ("filtered_servo", "encoder", "wrong", "move", "F04", 0.03, False),
     ("filtered_servo", "slide", "blocked", "move", "F02", 0.06, False),
     ("phase_servo", "carriage", "blocked", "move", "F02", 0.06, False),
@@ -1624,8 +1628,7 @@ def check_cell(cell: live_faults.Cell) -> None:
     assert cell.code in RULES
     assert cell.reaction in {REACTION_NAMES[rule.reaction], "torque off"}
     assert rule.recovery != "H" or not cell.known
-    if cell.known and cell.wrong:  # what keeps a position that is wrong is counted on the page
-        return
+    assert not (cell.known and cell.wrong)
     assert cell.recovered.startswith("reset enable")
     assert cell.known or "reference" in cell.recovered or cell.name == "print_head"
 
@@ -2874,3 +2877,62 @@ def test_47_a_page_sees_rows_of_its_own_channels(panel: PanelRig) -> None:
         assert "nobody watches" in one.ask(do="scope", channels=["lines.motor.count"])["error"]
         status = one.until("status")
         assert (status["clients"], status["holder"]) == (3, 0)
+
+
+def test_37_a_limit_switch_is_left_away_from_it_only():
+    """F30: onto it at full speed, rest, no further; the other way is free."""
+    bench = Bench("cascade", "limit_switches.upper=80 mm", careful=False)
+    bench.pass_time(0.05)
+    bench.do(ops.ENABLE)
+    bench.operation.trust = ops.NOT_KNOWN  # what a hard limit is for
+    bench.host.axis.live.operation.creep = 1.0
+    assert bench.do(ops.MOVE_BY, 0.3).how == ops.FAILED
+    bench.pass_time(1.0)
+    assert (bench.operation.fault, bench.host.state, bench.operation.demand.do) == (30, "fault", ops.HALT)
+    passed = bench.host.axis.state.plant.machine.load.position - 0.08
+    v, a, j = 0.5, 5.0, 200.0  # from its speed at the switch to rest
+    assert 0.0 < passed < v * v / (2 * a) + v * a / (2 * j) + 2e-3
+    bench.do(ops.RESET)
+    assert bench.do(ops.ENABLE).how == ops.DONE
+    here = bench.answer.commanded
+    assert (bench.do(ops.MOVE_BY, 1e-3).why, bench.operation.fault) == (ops.BEYOND, 0)
+    assert bench.answer.commanded == here
+    assert bench.do(ops.MOVE_BY, -0.1).how == ops.DONE
+    assert bench.do(ops.MOVE_BY, 1e-3).how == ops.DONE
+
+
+def test_37_a_motor_that_has_more_than_it_bears_comes_to_rest_in_the_time_of_its_model():
+    """F21: to and fro without a rest until the squared current, smoothed, has reached that of `motor.max_current`."""
+    bench = Bench("cascade", "motor.max_current=0.4 A", "protection.thermal_time=2 s").enable()
+    heat = bench.host.axis.state.controller.supervision
+    drive, way, ending, squares, periods = bench.host.axis.state.lines, 0.1, None, 0.0, 0
+    while periods < 10000 and not bench.operation.fault:
+        if ending is None or bench.host.ending(ending) is not None:
+            ending, way = bench.host.ask(ops.MOVE_BY, way), -way
+        bench.host.run(1)
+        periods += 1
+        squares += (drive.command * 0.8 / 0.4) ** 2
+    assert (bench.operation.fault, bench.operation.trust) == (21, ops.REFERENCED)
+    mean = squares / periods  # 1 = mean (1 - exp(-t / T)), as far as the load is even
+    assert mean > 1.0
+    assert mean * -math.expm1(-periods * 1e-3 / 2.0) == pytest.approx(1.0, abs=0.25)
+    assert 1.0 < heat.heat < 1.1
+    bench.pass_time(1.0)
+    assert (bench.host.state, bench.operation.demand.do) == ("fault", ops.REST_OFF)
+    cooled = float(heat.heat)
+    bench.pass_time(2.0)
+    assert heat.heat == pytest.approx(cooled * math.exp(-1.0), rel=1e-3)
+    bench.do(ops.RESET)
+    assert bench.do(ops.ENABLE).how == ops.DONE
+
+
+def test_37_a_loop_that_swings_comes_to_rest():
+    """F14: a drive that is late by 10 ms makes the loop unstable; an overshoot after a move is none."""
+    bench = Bench("cascade").enable()
+    bench.do(ops.MOVE_BY, 0.05)
+    bench.host.ask(*injection_of(bench.host.axis.places, "drive delayed 10 ms"))
+    bench.host.ask(ops.MOVE_BY, 0.05)
+    bench.pass_time(1.5)
+    assert bench.operation.fault == 14
+    assert bench.operation.trust == ops.REFERENCED
+    assert "swings" in bench.host.axis.fault()

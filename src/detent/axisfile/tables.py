@@ -267,6 +267,23 @@ class HomeTable(Table, frozen=True):
         return self.model_copy(update={key: new for key, new in derived.items() if math.isnan(getattr(self, key))})
 
 
+class LimitSwitchTable(Table, frozen=True):
+    """Limit switches at both ends of the way, normally closed."""
+
+    lower: Length = optional(
+        "where the lower one opens", math.nan, derived="limits.lowest - limits.travel / 50", ge=-1e5, le=1e5
+    )
+    upper: Length = optional(
+        "where the upper one opens", math.nan, derived="the upper end + limits.travel / 50", ge=-1e5, le=1e5
+    )
+
+    def completed(self, lowest: float, highest: float) -> Self:
+        """The same with what was left to the ends of the travel [m]."""
+        far = (highest - lowest) / 50
+        derived = {"lower": lowest - far, "upper": highest + far}
+        return self.model_copy(update={key: new for key, new in derived.items() if math.isnan(getattr(self, key))})
+
+
 class ProtectionTable(Table, frozen=True):
     """What ends a motion that is not what was asked for; a time of 0 switches its watch off."""
 

@@ -20,7 +20,7 @@ from detent.control.axis_states import (
     SWITCH_ON_DISABLED,
     ordered,
 )
-from detent.control.reaction import LETS_GO, LOSES, is_among
+from detent.control.reaction import DOUBTS, IN_MOTION, LETS_GO, LOSES, is_among
 from detent.kernel.registers import Registers, block, f8, i2_array, i8, i8_array, register, u1, u1_array, u2
 from detent.kernel.step import hot_step, step
 
@@ -111,6 +111,7 @@ class Answer(Registers):
     ready: u1 = register("1 once it can be enabled")
     limited: u1 = register("1 while the command is at its limit")
     fault: u2 = register("fault that has taken its torque away, 0 none", unit="code")
+    alone: u1 = register("1 where one sensor counts the way, and nothing else says where the axis is")
     soft: u2 = register("fault of its guard at which the drive goes on, 0 none", unit="code")
     refused: u2 = register("why it does not do what it was told, 0 it does", unit="code")
 
@@ -231,8 +232,12 @@ def fail(o: Operation, code: int) -> None:
 
 @hot_step
 def doubt(o: Operation, code: int) -> None:
-    """After some faults nobody knows any more where the axis is."""
-    if is_among(code, LOSES):
+    """After some faults nobody knows any more where the axis is.
+
+    An axis that does not follow, or an effort at its limit, may be a sensor that counts no more: where that one alone
+    counts the way, what it has missed is lost.
+    """
+    if is_among(code, LOSES) or (o.answer.alone and (code >= IN_MOTION or is_among(code, DOUBTS))):
         o.trust = NOT_KNOWN
 
 

@@ -39,6 +39,8 @@ that is not here, of a method's own electronics, has taken the torque away."""
 
 IN_MOTION = 60  # numbers below: faults of an axis; above: of files and tables
 LOSES = sum(1 << code for code, rule in RULES.items() if code < IN_MOTION and rule.recovery == "H")
+DOUBTS = 1 << 10 | 1 << 11
+"""What a load does as well as a sensor that counts no more: where that one counts alone, the position is then lost."""
 LETS_GO = sum(1 << code for code, rule in RULES.items() if code < IN_MOTION and rule.reaction == RAMP_OFF)
 SOFT = sum(1 << code for code, rule in RULES.items() if code < IN_MOTION and rule.reaction in (RAMP_OFF, RAMP_HOLD))
 """Faults at which the drive goes on, so that the axis can be brought to rest: a bit per number."""

@@ -1,4 +1,4 @@
-"""What an axis has to find its reference by: a switch at one side of its way, and index marks of its encoder."""
+"""What an axis has along its way: a switch at one side, index marks of its encoder, limit switches at both ends."""
 
 import math
 
@@ -13,6 +13,21 @@ class HomeWires(Registers):
     switch: u1 = register("1 on the home switch")
     marks: i8 = register("index marks passed", unit="count")
     mark: EncoderWord = block("encoder at the last one")
+
+
+class EndWires(Registers):
+    """The circuits of both limit switches: closed while nothing stands on them, so that a wire that breaks is seen."""
+
+    lower: u1 = register("1 while the circuit of the lower limit switch is closed")
+    upper: u1 = register("1 while that of the upper one is")
+
+
+class EndSwitchParams(Registers):
+    """Where the limit switches are."""
+
+    present: u1 = register("1 where there are any")
+    lower: f8 = register("where the lower one opens", unit="m")
+    upper: f8 = register("where the upper one opens", unit="m")
 
 
 class HomeMarksParams(Registers):
@@ -34,6 +49,7 @@ class HomeMarks(Registers):
 @step
 def latch(word: EncoderWord, travel: float, position: float) -> None:
     """The nearest count of a scale at `position` [m], `travel` [m] per count; without counts the position itself."""
+    word.lost = 0
     if travel == 0.0:
         word.place = position
     else:
@@ -50,6 +66,13 @@ def sense_home(p: HomeMarksParams, r: HomeMarks, wires: HomeWires, position: flo
             wires.marks += 1
             latch(wires.mark, travel, p.mark + max(cell, r.cell) * p.pitch)
             r.cell = cell
+
+
+@step
+def sense_ends(p: EndSwitchParams, wires: EndWires, position: float) -> None:
+    """Limit switches with the load at `position` [m]."""
+    wires.lower = 1 if position > p.lower else 0
+    wires.upper = 1 if position < p.upper else 0
 
 
 def stand_home(p: HomeMarksParams, r: HomeMarks, wires: HomeWires, position: float) -> None:

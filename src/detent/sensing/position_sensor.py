@@ -5,7 +5,7 @@ count is a velocity resolution per T: the span and the filter trade this noise f
 constant of the filter.
 """
 
-from detent.kernel.registers import Registers, f8, f8_array, i8, register
+from detent.kernel.registers import Registers, f8, f8_array, i8, register, u1
 from detent.kernel.step import step
 
 MEMORY = 64  # samples kept; delay and span together are shorter
@@ -16,6 +16,7 @@ class EncoderWord(Registers):
 
     count: i8 = register("count", unit="count")
     place: f8 = register("of an ideal encoder, which has no counts: position", unit="m")
+    lost: u1 = register("1 where the word is none: its check failed, or nothing came")
 
 
 class PositionSensorParams(Registers):
@@ -55,9 +56,9 @@ def shift_positions(r: PositionSensor, way: float) -> None:
 
 @step
 def read_word(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) -> None:
-    """Sample: take the word of the encoder."""
-    r.place = (r.place + 1) % MEMORY
-    r.memory[r.place] = position_of(p, r, word)
+    """Sample: take the word of the encoder; one that is none leaves the position where it was."""
+    last, r.place = r.memory[r.place], (r.place + 1) % MEMORY
+    r.memory[r.place] = last if word.lost else position_of(p, r, word)
     r.position = r.memory[(r.place - p.delay) % MEMORY]
     before = r.memory[(r.place - p.delay - p.span) % MEMORY]
     r.velocity += p.smoothing * ((r.position - before) / (p.span * p.period) - r.velocity)

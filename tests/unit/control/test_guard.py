@@ -22,6 +22,7 @@ from detent.control.guard import (
     weigh_effort,
 )
 from detent.control.reaction import SOFT
+from detent.control.supervision import DISAGREE, LINK_LOST, ON_SWITCH, OPEN_WIRE, SWINGS, TOO_HOT
 from detent.errors import GUARD_TEXT
 
 WATCHES = {"speed": 11, "jump": 15, "travel": 1, "following": 3, "saturated": 4, "stuck": 5, "reversed": 6}
@@ -154,7 +155,8 @@ def test_a_late_arrival_switches_nothing_off_and_gives_way_to_what_does():
 
 
 def test_every_fault_has_its_text():
-    assert set(GUARD_TEXT) == {
+    around = {LINK_LOST, DISAGREE, SWINGS, TOO_HOT, ON_SWITCH, OPEN_WIRE}
+    assert set(GUARD_TEXT) == around | {
         STUCK, JUMPED, REVERSED, FOLLOWING, SATURATED, OVERSPEED, NO_ARRIVAL, TRAVEL, NO_NUMBER
     }  # fmt: skip
 

@@ -223,6 +223,18 @@ def test_a_fault_ends_the_command_and_stays_until_it_is_reset():
     assert (desk.o.state, desk.o.fault) == (SWITCH_ON_DISABLED, 0)
 
 
+@pytest.mark.parametrize(("alone", "code", "trust"), [
+    (0, 10, ops.REFERENCED), (0, 221, ops.REFERENCED), (1, 10, ops.NOT_KNOWN), (1, 11, ops.NOT_KNOWN),
+    (1, 221, ops.NOT_KNOWN), (1, 13, ops.REFERENCED), (1, 30, ops.REFERENCED), (0, 12, ops.NOT_KNOWN),
+])  # fmt: skip
+def test_where_one_sensor_alone_counts_what_it_may_have_missed_is_lost(alone, code, trust):
+    desk = Desk().enabled()
+    assert desk.o.trust == ops.REFERENCED
+    desk.a.alone, desk.a.fault = alone, code
+    desk.pass_looks()
+    assert (desk.o.fault, desk.o.trust) == (code, trust)
+
+
 def test_a_soft_fault_comes_to_rest_and_holds():
     desk = Desk().enabled()
     move = desk.ask(ops.MOVE_BY, 0.2)

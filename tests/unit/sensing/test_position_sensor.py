@@ -102,3 +102,12 @@ def test_after_power_on_it_has_stood_there_for_long():
     for _ in range(3 * MEMORY):
         read_position(p, r, 0.1234567)
         assert (r.position, r.velocity) == (12346 * COUNT, 0.0)
+
+
+def test_a_word_that_is_none_leaves_the_position_where_it_was():
+    p = sensor(resolution=COUNT)
+    r = standing(p, 5 * COUNT)
+    read_word(p, r, EncoderWord(count=900, lost=1))
+    assert (r.position, r.velocity) == (5 * COUNT, 0.0)
+    read_word(p, r, EncoderWord(count=7))
+    assert r.position == 7 * COUNT

@@ -7,6 +7,7 @@ from detent.axisfile.blocks import fill_guard, fill_push, samples
 from detent.axisfile.tables import HomeTable
 from detent.control.cascade_law import CascadeLawParams
 from detent.control.homing import HomingParams
+from detent.kernel.elementary import one_less_exp
 from detent.methods.cascade.controller import CascadeControllerParams
 from detent.methods.cascade.derive import grain
 from detent.methods.cascade.loop import machine_of
@@ -22,6 +23,9 @@ WAYS = "contact", "switch", "index"  # as the block of homing numbers them
 DEEPEST = 1e-4  # share of the travel by which the largest effort presses a hard stop in
 LAG = 1e-4  # share of the travel by which a commanded point ahead of an axis that stands tells of a hard stop
 CONTACT_TIME = 0.01  # for so long [s], or half as long as the guard would let it
+
+LINK_TIME = 5e-3  # within which a second word that is none is a fault [s]
+HALF_SWING = 50e-3  # longest half swing that is part of an oscillation [s]
 
 LONGEST_TICK = 1e-4  # longest tick [s]: a push begins, and a record is written, at whole ticks
 STANDING = 0.02  # counts in a sample below which a measured velocity, as filtered, is rest
@@ -42,6 +46,10 @@ def build_cascade(spec: CascadeSpec) -> CascadeParams:
     c.feedback.velocity_on_load = spec.method.feedback.velocity == "load"
     _fill_law(c.law, spec)
     _fill_limits(c, spec)
+    _fill_supervision(c, spec)
+    if spec.limit_switches is not None:
+        ends, switches = p.plant.ends, spec.limit_switches
+        ends.present, ends.lower, ends.upper = 1, switches.lower, switches.upper
     ticks = sample_ticks(period, fastest_rate(p.plant.machine))
     fill_push(p.plant.push, spec.disturbance.push, period / ticks)
     fill_clocks(p, period / ticks, ticks)
@@ -118,6 +126,18 @@ def _fill_limits(p: CascadeControllerParams, spec: CascadeSpec) -> None:
         p.guard.speed = p.guard.jump = p.guard.stuck = p.guard.reversed = 0
     if p.guard.reversed:  # and one swing, in which the motor need not go where effort and force together send the axis
         p.guard.reversed += spec.drive.delay + spec.encoder.delay + samples(spec.swing, period)
+
+
+def _fill_supervision(c: CascadeControllerParams, spec: CascadeSpec) -> None:
+    p, table, period = c.supervision, spec.protection, spec.method.sample_period
+    tables = (spec.encoder, spec.load_encoder)
+    p.link = samples(LINK_TIME, period) if any(one.checked for one in tables if one is not None) else 0
+    p.slip = table.slip if spec.load_encoder is not None else 0.0
+    p.swing, p.slowest = table.oscillation, samples(HALF_SWING, period)
+    p.switches = spec.limit_switches is not None
+    if table.thermal_time > 0.0 and spec.motor is not None and spec.motor.max_current is not None:
+        p.bears = spec.motor.max_current / spec.drive.current_per_volt
+        p.warming = one_less_exp(period / table.thermal_time)
 
 
 def _fill_law(p: CascadeLawParams, spec: CascadeSpec) -> None:

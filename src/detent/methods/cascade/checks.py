@@ -124,6 +124,21 @@ def _places(spec: CascadeSpec) -> Iterator[Contradiction]:
         nearest = put(key, f'"{low if start < low else high!r} {unit}"')
         yield wrong(f"{key} limits.travel limits.lowest", allowed, nearest)
 
+    switches = spec.limit_switches
+    if switches is not None and not switches.lower < start < switches.upper:
+        allowed = f"such that the start of the axis, {text(start, unit)}, lies between both limit switches"
+        moved = "leave lower and upper out of [limit_switches]: they then lie a little beyond the travel"
+        yield wrong("limit_switches.lower limit_switches.upper mechanics.start_position", allowed, moved)
+
+
+def _heat(spec: CascadeSpec) -> Iterator[Contradiction]:
+    """A model of the motor's heat goes by its current."""
+    bears = spec.motor is not None and spec.motor.max_current is not None
+    if spec.protection.thermal_time > 0.0 and not (bears and spec.drive.input == "current"):
+        allowed = '"0 s" without motor.max_current, or where drive.input is not "current"'
+        remedy = put("protection.thermal_time", '"0 s"')
+        yield wrong("protection.thermal_time motor.max_current drive.input", allowed, remedy)
+
 
 def directions(spec: CascadeSpec) -> dict[str, DirectionTable]:
     """Friction of both masses in both directions, by their tables."""
@@ -236,7 +251,7 @@ def _home(spec: CascadeSpec) -> Iterator[Contradiction]:
         yield wrong("home.position home.back_off limits.travel", allowed, remedy.exactly("home.position", end))
 
 
-RULES = (_motor, _masses, _gains, _encoders, _places, _rate, _drive, _supervision, _home)
+RULES = (_motor, _masses, _gains, _encoders, _places, _heat, _rate, _drive, _supervision, _home)
 """Contradictions are reported in this order."""
 
 

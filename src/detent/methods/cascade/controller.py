@@ -8,10 +8,11 @@ answer.
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference
 from detent.control.cascade_law import control as control_law
 from detent.control.guard import Guard, GuardParams, is_overdue, lasting, watch, watch_number, weigh_effort
+from detent.control.supervision import Supervision, SupervisionParams, supervise, warm_up
 from detent.kernel.loop import HostArray, controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
-from detent.sensing.home_marks import HomeWires
+from detent.sensing.home_marks import EndWires, HomeWires
 from detent.sensing.position_sensor import EncoderWord, PositionSensor, PositionSensorParams, read_word
 
 ARRIVED, FAULT = 1, 2  # events
@@ -49,6 +50,7 @@ class CascadeControllerParams(Registers):
     law: CascadeLawParams = block("position and velocity loop")
     limits: LimitParams = block("what the guard compares with")
     guard: GuardParams = block("how long something may be wrong")
+    supervision: SupervisionParams = block("what else there is to watch")
 
 
 class Peaks(Registers):
@@ -74,6 +76,7 @@ class CascadeController(Registers):
     load_sensor: PositionSensor = block("encoder of the load")
     law: CascadeLaw = block("position and velocity loop")
     guard: Guard = block("what is wrong")
+    supervision: Supervision = block("what was seen around the loop")
     count: i8 = register("motor's encoder at the last sample, for the guard", unit="count")
     within: i8 = register("samples in the window up to this one", unit="count")
     peaks: Peaks = block("largest magnitudes")
@@ -85,6 +88,7 @@ class CascadeLines(Registers):
     motor: EncoderWord = block("encoder of the motor", by=PLANT)
     load: EncoderWord = block("encoder of the load", by=PLANT)
     home: HomeWires = block("home switch and index", by=PLANT)
+    ends: EndWires = block("limit switches", by=PLANT)
     sync: u1 = register("1 where the encoders latch in the next tick, and the amplifier then takes over", by=CONTROLLER)
     enable: u1 = register("0: the amplifier takes no command", by=CONTROLLER)
     command: f8 = register("command to the amplifier", unit="V", by=CONTROLLER)
@@ -173,8 +177,13 @@ def sample(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines
         output = decide(p, c)
         note_peaks(c)
         if c.guarded:
-            look_after(p, c, lines.motor.count)
+            lost, apart = lines.motor.lost | lines.load.lost, c.motor_sensor.position - c.load_sensor.position
+            lower, upper, error = lines.ends.lower, lines.ends.upper, c.law.position_error
+            supervise(p.supervision, c.supervision, p.guard, c.guard, lost, apart, lower, upper, error)
+            # A word that is none is no jump: until the next one the motor goes on as it did.
+            look_after(p, c, c.count + c.guard.moved if lines.motor.lost else lines.motor.count)
             output = output if c.on else 0.0
+    warm_up(p.supervision, c.supervision, output)
     lines.enable, lines.command = c.on, output
 
 

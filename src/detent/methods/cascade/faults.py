@@ -5,14 +5,26 @@ from collections.abc import Mapping
 
 from detent.kernel.loop import HostArray, disturbs
 from detent.kernel.step import step
-from detent.methods.cascade.controller import control
-from detent.methods.cascade.plant import CascadePlant, move, sense
+from detent.methods.cascade.controller import CascadeLines, control
+from detent.methods.cascade.plant import CascadePlant, CascadePlantParams, move, sense
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.system import Cascade, CascadeParams
-from detent.plant.injection import BLOCKED, PUSH, WORD_KINDS, Injection, Place, spoilt, spoilt_effort
+from detent.plant.injection import (
+    BLOCKED,
+    GARBAGE,
+    INTERMITTENT,
+    OFF,
+    PUSH,
+    WORD_KINDS,
+    Injection,
+    Place,
+    spoilt,
+    spoilt_effort,
+)
+from detent.sensing.home_marks import EndWires
 from detent.sensing.position_sensor import EncoderWord
 
-MOTOR, LOAD, DRIVE, MACHINE = range(1, 5)
+MOTOR, LOAD, DRIVE, MACHINE, MOTOR_LINK, LOAD_LINK, LOWER, UPPER, BOTH = range(1, 10)
 
 
 @step
@@ -23,6 +35,40 @@ def spoil_encoder(f: Injection, word: EncoderWord, travel: float) -> None:
         word.count = math.floor(spoilt(f, 0, word.count, word.count, 0.0))
     else:
         word.place = spoilt(f, 0, word.place, word.place, 0.0)
+
+
+@step
+def spoil_link(f: Injection, word: EncoderWord) -> None:
+    """A word that fails its check is none, whatever it shows."""
+    f.since += 1
+    if spoilt(f, 0, 1.0, 1.0, 1.0) == 0.0:
+        word.lost, word.count, word.place = 1, 0, 0.0
+
+
+@step
+def spoil_ends(f: Injection, ends: EndWires) -> None:
+    """The wire of one limit switch, or the one that both share."""
+    f.since += 1
+    closed = 1 if spoilt(f, 0, 1.0, 1.0, 1.0) else 0
+    if f.place != UPPER:
+        ends.lower &= closed
+    if f.place != LOWER:
+        ends.upper &= closed
+
+
+@step
+def spoil_lines(p: CascadePlantParams, f: Injection, lines: CascadeLines) -> None:
+    """What arrives of a sample."""
+    if f.place == MOTOR:
+        spoil_encoder(f, lines.motor, p.motor_count)
+    elif f.place == LOAD:
+        spoil_encoder(f, lines.load, p.load_count)
+    elif f.place == MOTOR_LINK:
+        spoil_link(f, lines.motor)
+    elif f.place == LOAD_LINK:
+        spoil_link(f, lines.load)
+    elif f.place >= LOWER:
+        spoil_ends(f, lines.ends)
 
 
 @step
@@ -44,10 +90,8 @@ def disturbed_tick(p: CascadeParams, r: Cascade, f: Injection, *feed: HostArray)
         return False
     plant, lines, push = r.plant, r.lines, p.plant.push
     sense(p.plant, plant, plant.machine, lines)
-    if plant.latched and f.place == MOTOR:
-        spoil_encoder(f, lines.motor, p.plant.motor_count)
-    if plant.latched and f.place == LOAD:
-        spoil_encoder(f, lines.load, p.plant.load_count)
+    if plant.latched:
+        spoil_lines(p.plant, f, lines)
     control(p.controller, r.controller, lines, *feed)
     if plant.latched and f.place == DRIVE:
         f.since += 1
@@ -74,6 +118,13 @@ def places(spec: CascadeSpec, params: CascadeParams, period: float) -> Mapping[s
         both[name] = Place(
             number, WORD_KINDS, period, wrong=4.0 * largest, unit=unit, scale=travel or 1.0, time=80 * period
         )
+    links = [("encoder link", MOTOR_LINK, spec.encoder), ("load encoder link", LOAD_LINK, spec.load_encoder)]
+    for name, number, table in links:
+        if table is not None and table.checked:
+            both[name] = Place(number, (OFF, GARBAGE, INTERMITTENT), period, time=2 * period)
+    for name, number in (("lower switch", LOWER), ("upper switch", UPPER), ("both switches", BOTH)):
+        if spec.limit_switches is not None:
+            both[name] = Place(number, (OFF, INTERMITTENT), period, time=80 * period)
     push, push_unit = 0.5 * spec.limits.effort, spec.unit("N")
     return both | {
         "drive": Place(DRIVE, WORD_KINDS, period, time=80 * period),

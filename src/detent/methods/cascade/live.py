@@ -28,6 +28,7 @@ from detent.control.operation import (
     OperationParams,
 )  # fmt: skip
 from detent.control.reaction import SOFT
+from detent.control.supervision import DISAGREE, SWINGS
 from detent.kernel.loop import lay_ready, serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
@@ -62,13 +63,17 @@ class CascadeLive(Registers):
 
 
 @step
-def set_limits(q: CascadeLiveParams, memory: CascadeLive, o: Operation) -> None:
-    """Limits of a motion: its share of the speed; no ends while nobody knows where they are."""
+def set_limits(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Operation) -> None:
+    """Limits of a motion: its share of the speed; no ends while nobody knows where they are, but off a limit switch."""
     m = memory.limits
     m.speed, m.acceleration, m.jerk = q.course.speed * o.demand.share, q.course.acceleration, q.course.jerk
     m.lowest, m.highest = q.course.lowest, q.course.highest
     if o.trust == NOT_KNOWN:
         m.lowest, m.highest = -1e9, 1e9
+    if c.supervision.side > 0:
+        m.highest = memory.course.position
+    elif c.supervision.side < 0:
+        m.lowest = memory.course.position
 
 
 @step
@@ -93,7 +98,7 @@ def search(  # noqa: PLR0913 - as `serve`, and where the axis is
     s.mark = here.position + (mark - c.motor_sensor.position)
     if d.fresh:
         o.trust = NOT_KNOWN
-        set_limits(q, memory, o)
+        set_limits(q, c, memory, o)
         told = begin(q.homing, h, s)
     else:
         told = seek(q.homing, h, s)
@@ -122,10 +127,10 @@ def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Ope
         enable_guard(c.guard)
         c.on = 1
     elif d.do == TRAVEL:
-        set_limits(q, memory, o)
+        set_limits(q, c, memory, o)
         why = go_to(memory.limits, memory.course, d.target)
     elif d.do == RUN:
-        set_limits(q, memory, o)
+        set_limits(q, c, memory, o)
         top = memory.limits.speed
         why = run_at(memory.limits, memory.course, min(max(d.velocity, -top), top))
     elif d.do == HALT:
@@ -210,4 +215,5 @@ def guard_limits(spec: CascadeSpec) -> dict[int, float]:
         SATURATED: 1.0,
         END_OF_TRAVEL: spec.highest,
     }
+    found |= {DISAGREE: table.slip, SWINGS: table.oscillation}
     return found | {OVERSPEED: table.overspeed * speed, JUMPED: table.jump * speed * spec.method.sample_period}

@@ -9,7 +9,14 @@ from detent.plant.push import Push, push_force
 from detent.plant.two_mass import TwoMass, TwoMassParams
 from detent.plant.two_mass_motion import move_masses
 from detent.sensing.gauge import Gauge, read_gauge
-from detent.sensing.home_marks import HomeMarks, HomeMarksParams, latch, sense_home
+from detent.sensing.home_marks import (
+    EndSwitchParams,
+    HomeMarks,
+    HomeMarksParams,
+    latch,
+    sense_ends,
+    sense_home,
+)
 
 
 class CascadePlantParams(Registers):
@@ -21,6 +28,7 @@ class CascadePlantParams(Registers):
     load_count: f8 = register("travel per count of the load's encoder; 0: it shows the position itself", unit="m")
     push: Push = block("disturbing force on the load")
     home: HomeMarksParams = block("switch and marks by which it finds its reference")
+    ends: EndSwitchParams = block("limit switches, passed by the load")
     stop: HardStop = block("hard stop at one end of the way of the load")
 
 
@@ -49,6 +57,8 @@ def sense(p: CascadePlantParams, plant: CascadePlant, machine: TwoMass, lines: C
         latch_both(p, machine, lines)
         if p.home.present:
             sense_home(p.home, plant.home, lines.home, machine.motor.position, p.motor_count)
+        if p.ends.present:
+            sense_ends(p.ends, lines.ends, machine.load.position)
 
 
 @hot_step

@@ -240,6 +240,8 @@ def describe_cause(host: CascadeHost) -> str:
         lower=f"{_text(spec, spec.limits.lowest)}, limits.lowest",
         upper=f"{_text(spec, spec.highest)}, limits.lowest + limits.travel",
         following=f"{_text(spec, method.following_error)}, method.following_error",
+        slip=_text(spec, spec.protection.slip),
+        swing=_text(spec, spec.protection.oscillation),
     )
 
 

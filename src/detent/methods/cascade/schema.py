@@ -15,6 +15,7 @@ from detent.axisfile.tables import (
     AxisTable,
     HardwareTable,
     HomeTable,
+    LimitSwitchTable,
     MotionProtectionTable,
     MotorTable,
     PushTable,
@@ -77,6 +78,10 @@ class LimitsTable(Table, frozen=True):
 class CascadeMotorTable(MotorTable, frozen=True):
     """Constants of the DC motor, from a catalogue or stated; the winding's inductance may be neglected."""
 
+    max_current: Current | None = optional(
+        "continuous current of the motor; for a warning, and with protection.thermal_time for a fault",
+        None, gt=0.0, le=10000.0,
+    )  # fmt: skip
     inductance: Inductance = optional(
         "winding; 0: the current follows voltage and speed instantly", 0.0, ge=0.0, le=10.0
     )
@@ -175,6 +180,9 @@ class EncoderTable(Table, frozen=True):
     delay: int = optional("samples until a position is read", 0, ge=0, le=MOST_SAMPLES - 1)
     velocity_span: int = optional("number of samples of the velocity difference", 1, ge=1, le=MOST_SAMPLES)
     velocity_filter: Time = optional("time constant of the velocity filter; 0: none", 0.0, ge=0.0, le=10.0)
+    checked: bool = optional(
+        "its words come over a link with a check (CRC, status bit), so that one that is none is known", default=False
+    )
 
 
 # What reads the position itself, in the place of an encoder that is not there.
@@ -255,6 +263,23 @@ class MethodTable(Table, frozen=True):
     feed_forward: FeedForwardTable = Field(default_factory=FeedForwardTable)
 
 
+class CascadeProtectionTable(MotionProtectionTable, frozen=True):
+    """What ends a motion that is not what was asked for; a time or a length of 0 switches its watch off."""
+
+    slip: Length = optional(
+        "difference between the encoders of motor and load", math.nan,
+        derived="backlash, 3 x twist of the coupling at the largest effort, 4 counts, and what their delays make of it",
+        ge=0.0, le=1e3,
+    )  # fmt: skip
+    oscillation: Length = optional(
+        "position error to one side and the other in turn, ten times, each within 50 ms", math.nan,
+        derived="4 x method.in_position", ge=0.0, le=1e3,
+    )  # fmt: skip
+    thermal_time: Time = optional(
+        "time constant of the motor's heat; needs motor.max_current, which it bears for ever", 0.0, ge=0.0, le=1e5
+    )
+
+
 class LoadPushTable(PushTable, frozen=True):
     """A force on the load for a while."""
 
@@ -278,8 +303,9 @@ class CascadeSpec(AxisSpec, frozen=True):
     encoder: EncoderTable
     load_encoder: EncoderTable | None = None
     method: MethodTable = Field(default_factory=MethodTable)
-    protection: MotionProtectionTable = Field(default_factory=MotionProtectionTable)
+    protection: CascadeProtectionTable = Field(default_factory=CascadeProtectionTable)
     home: HomeTable | None = None
+    limit_switches: LimitSwitchTable | None = None
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
     hardware: HardwareTable | None = None
 
@@ -414,6 +440,22 @@ def fill_derived(spec: CascadeSpec) -> CascadeSpec:
     if spec.home is not None:
         ends, pitch = (limits.lowest, spec.highest), spec.mechanics.travel_per_revolution or 0.0
         spec = spec.changed(home=spec.home.completed(ends, limits.speed, pitch))
+    if spec.limit_switches is not None:
+        spec = spec.changed(limit_switches=spec.limit_switches.completed(limits.lowest, spec.highest))
     # What breaks the axis loose takes its weight, too.
     loose = max(spec.friction(1).static, spec.friction(-1).static) + spec.holding
-    return spec.filled(protection={"stuck_effort": breaking_effort(loose, spec.largest_effort)})
+    return spec.filled(protection={
+        "stuck_effort": breaking_effort(loose, spec.largest_effort), "slip": _usual_slip(spec),
+        "oscillation": 4 * spec.method.in_position,
+    })  # fmt: skip
+
+
+def _usual_slip(spec: CascadeSpec) -> float:
+    """What a sound machine has between both encoders at most [m]; 0 where there is one."""
+    if spec.load_encoder is None:
+        return 0.0
+    coupling, both = spec.mechanics.coupling, (spec.encoder, spec.load_encoder)
+    twist = 0.0 if coupling is None else coupling.backlash + 3 * spec.largest_effort / coupling.stiffness
+    late = abs(both[0].delay - both[1].delay) * spec.method.sample_period
+    speed = 1.1 * max(spec.limits.speed, spec.method.velocity_limit)
+    return twist + 4 * sum(one.resolution for one in both) + late * speed

@@ -85,6 +85,10 @@ def wiring(spec: CascadeSpec) -> Wiring:
         (spec.load_encoder is not None, "an encoder on the load", "the encoder of the motor alone: it is the drive's",
          "leave out [load_encoder]"),
         (spec.encoder.resolution == 0.0, "an encoder without counts", "one with counts", "write encoder.resolution"),
+        (spec.limit_switches is not None, "limit switches", "none here: they are wired to the drive",
+         "leave out [limit_switches]"),
+        (spec.encoder.checked, "an encoder with a check", "one without: the drive looks after its encoder",
+         "leave out encoder.checked"),
         (spec.drive.delay == 0, "drive.delay = 0", "1 or more: a command acts a sample after its position",
          "write drive.delay = 1"),
     )  # fmt: skip

@@ -115,7 +115,7 @@ def serve(  # noqa: PLR0913 - as all of its kind
     a.limited = 1 if abs(lines.word) >= p.deviation.word_limit else 0
     a.rests = 1 if g.command == g.goal else 0
     a.near = 1 if abs(c.deviation.deviation) <= p.window else 0
-    a.ready = 1
+    a.ready = a.alone = 1
     a.fault = a.soft = 0
     if d.do == REST_OFF or c.deviation.reset:  # what was wrong is forgotten with the next tick
         return

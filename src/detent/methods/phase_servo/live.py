@@ -107,7 +107,7 @@ def serve(  # noqa: PLR0913 - as all of its kind
     a.limited = 1 if abs(c.law.word) >= p.law.word_limit - 1 else 0
     a.rests = 1 if s.ready and s.strobe == 0 else 0
     a.near = 1 if abs(memory.target - place) <= q.window else 0
-    a.ready = 1
+    a.ready = a.alone = 1
     a.fault = a.soft = 0
     if d.do != REST_OFF and s.state != ACQUIRE:
         a.soft = c.guard.code if lines.enable and c.guard.code != NO_ARRIVAL else 0

@@ -117,7 +117,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 # Keys of a rotary axis, of what is said about it, and of the host that runs it.
 ROTARY = {"axis.motion", "mechanics.pendulum"}
-SAID = {"hardware.id", "axis.name", "axis.method", "motor.max_current"}
+SAID = {"hardware.id", "axis.name", "axis.method"}
 HOST = {"method.timeout"}
 
 GUARDED = {
@@ -135,6 +135,20 @@ GUARDED = {
     "protection.stuck_effort": "0.8",
 }
 """What the guard of the controller is made of."""
+
+LINKS = ("load_encoder.resolution=2 um",)
+HEAT = ("motor.max_current=2 A", "protection.thermal_time=5 s")
+SUPERVISED: dict[str, tuple[str, tuple[str, ...]]] = {
+    "encoder.checked": ("true", ()),
+    "load_encoder.checked": ("true", LINKS),
+    "protection.slip": ("1 mm", LINKS),
+    "protection.oscillation": ("1 mm", ()),
+    "protection.thermal_time": ("2 s", HEAT),
+    "motor.max_current": ("1 A", HEAT),
+    "limit_switches.lower": ("-20 mm", ("limit_switches.lower=-5 mm",)),
+    "limit_switches.upper": ("520 mm", ("limit_switches.lower=-5 mm",)),
+}
+"""What is watched around the loop, and what must be stated for it."""
 
 HOMED = {
     "home.by": "contact",
@@ -191,8 +205,9 @@ def test_a_key_changes_the_run(key):
 
 def test_every_key_is_tried():
     keys = {row.key for row in reference_rows("cascade")}
-    assert set(CHANGES) | set(GUARDED) | set(HOMED) | ROTARY | SAID | HOST == keys
-    assert len(CHANGES) + len(GUARDED) + len(HOMED) + len(ROTARY | SAID | HOST) == len(keys)
+    watched = set(GUARDED) | set(SUPERVISED)
+    assert set(CHANGES) | watched | set(HOMED) | ROTARY | SAID | HOST == keys
+    assert len(CHANGES) + len(watched) + len(HOMED) + len(ROTARY | SAID | HOST) == len(keys)
 
 
 @pytest.mark.parametrize("key", HOMED)
@@ -210,7 +225,35 @@ def test_a_key_changes_the_guard(key):
     p, other = (build_cascade(load("cascade", *change)).controller for change in ((), (f"{key}={GUARDED[key]}",)))
     changed = diff(p, other)
     assert changed
-    assert all(path.startswith(("guard.", "limits.")) for path in changed)
+    assert all(path.startswith(("guard.", "limits.", "supervision.swing")) for path in changed)
+
+
+@pytest.mark.parametrize("key", SUPERVISED)
+def test_a_key_changes_what_is_watched(key):
+    value, given = SUPERVISED[key]
+    p, other = (build_cascade(load("cascade", *given, *change)) for change in ((), (f"{key}={value}",)))
+    changed = diff(p, other)
+    assert changed
+    place = ("plant.ends.",) if "switches" in key else ("controller.supervision.",)
+    assert all(path.startswith(place) for path in changed)
+
+
+def test_what_the_axis_has_not_got_is_not_watched():
+    p = build_cascade(load("cascade")).controller.supervision
+    assert (p.link, p.slip, p.switches, p.bears) == (0, 0.0, 0, 0.0)
+    assert (p.swing, p.slowest) == (pytest.approx(4 * 50e-6), 200)
+    p = build_cascade(load("cascade", *LINKS, *HEAT, "encoder.checked=true", "limit_switches.lower=-5 mm"))
+    found, ends = p.controller.supervision, p.plant.ends
+    assert (found.link, found.switches, found.bears) == (20, 1, 2.0 / 0.8)
+    assert found.slip == pytest.approx(3 * 600.0 / 60e6 + 4 * 3e-6)
+    assert found.warming == pytest.approx(0.25e-3 / 5.0, rel=1e-3)
+    assert (ends.present, ends.lower, ends.upper) == (1, -5e-3, pytest.approx(0.51))
+
+
+def test_a_late_encoder_lags_behind_the_other_and_does_not_disagree():
+    given = (*LINKS, "load_encoder.delay=4")
+    late, prompt = (build_cascade(load("cascade", *one)).controller.supervision.slip for one in (given, LINKS))
+    assert late - prompt == pytest.approx(4 * 0.25e-3 * 1.1 * 1.25 * 0.5)
 
 
 def test_an_encoder_without_counts_is_not_looked_after():

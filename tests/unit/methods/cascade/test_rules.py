@@ -102,10 +102,17 @@ HOME = [
     given("switch beyond the travel", "home.position=-6 mm", key="home.position"),
 ]
 
-ENTRIES = [*PARTS, *METHOD, *SENSORS, *PLANT, *HOME]
+WATCHED = [
+    given("heat of no current", "drive.input=voltage", "protection.thermal_time=5 s", key="protection.thermal_time"),
+    given("beyond a switch", "limit_switches.lower=30 mm", key="limit_switches.lower"),
+]
+
+ENTRIES = [*PARTS, *METHOD, *SENSORS, *PLANT, *HOME, *WATCHED]
 
 
-@pytest.mark.parametrize("bad", params(parts=PARTS, method=METHOD, sensors=SENSORS, plant=PLANT, home=HOME))
+@pytest.mark.parametrize(
+    "bad", params(parts=PARTS, method=METHOD, sensors=SENSORS, plant=PLANT, home=HOME, watched=WATCHED)
+)
 def test_rule(bad, good_text, load_text, golden):
     check_rule(bad, good_text, load_text, golden)
 
