@@ -34,7 +34,8 @@ PLAIN = "Serve the panel without TLS on a network; whoever is on it can then rea
 VIEWER = "Print a second link, for somebody who only looks, and may stop."
 WORD = (
     "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home; of the position "
-    "table: positions, teach, edit, rename, forget, undo, redo, export, import; inject, faults; link: to the panel."
+    "table: positions, teach, edit, rename, forget, undo, redo, export, import; job, pause, resume; inject, faults; "
+    "link: to the panel."
 )
 
 
@@ -239,6 +240,8 @@ def connect(
             raise DetentError('connect: a jog needs a velocity such as "20 mm/s"')
         with axis.jog(value):
             threading.Event().wait(seconds)
+    elif word == "job":
+        ended = _do_job(axis, value, speed)
     elif word not in ("status", "positions", "faults"):
         ended = axis.do(word, _about(word, value, second), speed, wait=False).wait().to_dict()
     if word in ("positions", *PLACES):
@@ -254,6 +257,17 @@ def connect(
     tell(describe_status(status, axis.unit))
     for what, remedy in axis.why_not_moving:
         tell(f"  not moving: {what}; {remedy}")
+
+
+def _do_job(axis: Any, path: str | None, speed: float) -> dict[str, Any]:
+    """Lead a job to its end; Ctrl-C stops it."""
+    if path is None:
+        raise DetentError("connect: got a job without a file; expected: one such as moves.csv; name it")
+    try:
+        return axis.run_job(path, speed=speed, wait=False).wait().to_dict()
+    except KeyboardInterrupt:
+        axis.stop()
+        raise
 
 
 def _about(word: str, value: str | None, second: str | None) -> object:

@@ -32,11 +32,11 @@ from detent.kernel.step import hot_step, step
 # ---- what may be asked
 (
     ENABLE, OFF, STOP, RESET, MOVE_TO, MOVE_BY, JOG, GO, HOME, KEEP, CONFIRM, TAKE, ORDER, TRUST, LEAVE, JOB, FEED,
-    LOWER, UPPER,
-) = COMMANDS = tuple(range(1, 20))  # fmt: skip
+    LOWER, UPPER, PAUSE, RESUME,
+) = COMMANDS = tuple(range(1, 22))  # fmt: skip
 COMMAND_NAMES = (
     "enable", "off", "stop", "reset", "move to", "move by", "jog", "go", "home", "keep", "confirm", "take", "order",
-    "trust", "leave", "job", "feed", "lower end", "upper end",
+    "trust", "leave", "job", "feed", "lower end", "upper end", "pause", "resume",
 )  # fmt: skip
 MANAGED = ENABLE, OFF, STOP, RESET, KEEP, CONFIRM, TAKE, ORDER, TRUST, LEAVE  # of every method; the others move it
 NEEDS_ID = 1  # smallest id of a command; 0 is none
@@ -78,6 +78,7 @@ class OperationParams(Registers):
 
     window_looks: i8 = register("looks inside the window until a command is done", unit="count")
     lease_looks: i8 = register("looks that a jog lives without being kept", unit="count")
+    job_looks: i8 = register("looks that a job lives without being kept", unit="count")
     settle_looks: i8 = register("looks at rest outside the window that are a fault; 0 never", unit="count")
     lowest: f8 = register("lower soft limit", unit="m")
     highest: f8 = register("upper soft limit", unit="m")
@@ -86,6 +87,7 @@ class OperationParams(Registers):
     creep: f8 = register("share of the largest speed while the position is not known", unit="1")
     one_at_a_time: u1 = register("1: a move under way must end before another begins")
     takes: i8 = register("what the method offers: a bit per command", unit="code")
+    performs: u1 = register("1: the moves of a job are made here; 0: the method does jobs in a way of its own")
 
 
 class Demand(Registers):
@@ -141,7 +143,8 @@ class Operation(Registers):
     kind: u1 = register("what it is", unit="code")
     within: i8 = register("looks in the window, the commanded point at rest", unit="count")
     outside: i8 = register("looks outside it, the commanded point at rest", unit="count")
-    lease: i8 = register("looks until an unkept jog is stopped", unit="count")
+    lease: i8 = register("looks until an unkept jog or job is stopped", unit="count")
+    paused: u1 = register("1 while the job that is under way is held")
     client: i8 = register("who commands, 0 nobody", unit="code")
     fault: u2 = register("first fault since the last reset, 0 none", unit="code")
     confirmed: u1 = register("1 once the first motion since enabling has been confirmed")
@@ -179,7 +182,7 @@ def end_running(o: Operation, how: int, why: int, by: int) -> None:
     if o.running:
         end(o, o.running, how, why, by)
     o.running = o.kind = 0
-    o.within = o.outside = o.lease = 0
+    o.within = o.outside = o.lease = o.paused = 0
 
 
 @hot_step
@@ -267,7 +270,7 @@ def lose_torque(o: Operation, code: int) -> None:
 @step
 def why_not(q: OperationParams, o: Operation, r: Request) -> int:
     """Reason to refuse a request, 0 for none; stop and off are never refused."""
-    if not (1 <= r.kind <= UPPER) or r.id < NEEDS_ID:
+    if not (1 <= r.kind <= RESUME) or r.id < NEEDS_ID:
         return UNKNOWN
     if not (abs(r.value) < 1e12 and 0.0 < r.speed <= 1.0):  # neither infinite nor no number
         return NOT_FINITE
@@ -275,7 +278,7 @@ def why_not(q: OperationParams, o: Operation, r: Request) -> int:
         return NOT_OFFERED
     if r.epoch != o.epoch:
         return STALE
-    if o.client not in (0, r.client) and r.kind != TAKE:
+    if o.client not in (0, r.client) and r.kind not in (TAKE, PAUSE, RESUME):  # who leads a job waits for its end
         return SECOND
     if r.kind == LEAVE:
         return 0
@@ -291,7 +294,7 @@ def why_not_now(q: OperationParams, o: Operation, r: Request) -> int:
         return why_not_move(q, o, r)
     if r.kind in (LOWER, UPPER):
         return 0 if can_move_end(q, o, r) else BEYOND
-    if r.kind == FEED:
+    if r.kind in (FEED, PAUSE, RESUME):
         return 0 if o.kind == JOB else NO_JOB
     if r.kind == TRUST and o.state == ENABLED:
         return MOVING
@@ -317,7 +320,7 @@ def why_not_move(q: OperationParams, o: Operation, r: Request) -> int:
         return BUSY
     if o.trust == NOT_KNOWN and r.kind in (MOVE_TO, GO, JOB):
         return UNREFERENCED
-    if r.kind == JOB and q.careful and not o.confirmed:  # it goes at speeds of its own
+    if r.kind == JOB and q.careful and not (o.confirmed or q.performs):  # it goes at speeds of its own
         return NOT_CONFIRMED
     if r.kind in (MOVE_TO, MOVE_BY) and not is_allowed(q, o, goal(o, r)):
         return BEYOND
@@ -393,7 +396,11 @@ def begin_motion(q: OperationParams, o: Operation, r: Request) -> None:
         tell(o, SEEK)
     elif r.kind == JOB:
         d.number, d.laid = round(r.value), 0
-        tell(o, WORK)
+        o.lease = q.job_looks
+        if q.performs == 0:
+            tell(o, WORK)
+        elif o.answer.rests == 0:
+            halt(o)
     else:
         d.target = goal(o, r)
         tell(o, TRAVEL)
@@ -420,8 +427,10 @@ def manage(q: OperationParams, o: Operation, r: Request) -> None:
         o.state, o.fault = ordered(o.state, RESET_FAULT), 0
         leave_torque(o)
     elif r.kind == KEEP:
-        if o.kind == JOG:
-            o.lease = q.lease_looks
+        if o.kind in (JOG, JOB):
+            o.lease = q.lease_looks if o.kind == JOG else q.job_looks
+    elif r.kind in (PAUSE, RESUME):
+        o.paused = 1 if r.kind == PAUSE else 0
     elif r.kind == CONFIRM:
         o.confirmed = 1
     elif r.kind in (TAKE, LEAVE):
@@ -493,7 +502,7 @@ def take_order(o: Operation, order: int, number: int) -> None:
 
 @step
 def look(o: Operation) -> None:
-    """One look before the method's: the drive's own transitions, faults, and the lease of a jog."""
+    """One look before the method's: the drive's own transitions, faults, and the lease of a jog or a job."""
     o.looks += 1
     a = o.answer
     if o.state == NOT_READY:
@@ -504,7 +513,7 @@ def look(o: Operation) -> None:
             leave_torque(o)
     if a.fault and (o.state != FAULT or o.softly):  # its torque has gone, also from where a ramp has led to
         fail(o, a.fault)
-    if o.kind == JOG and o.lease > 0:
+    if o.kind in (JOG, JOB) and o.lease > 0:
         o.lease -= 1
         if o.lease == 0:
             end_running(o, FAILED, LEASE_LOST, 0)
@@ -516,7 +525,7 @@ def judge(q: OperationParams, o: Operation) -> None:
     """After the method has answered: did it take the demand, and is the command done."""
     a, d = o.answer, o.demand
     if a.refused:  # in the look in which it was told, or later: a controller may need time to find out
-        end_running(o, REFUSED, a.refused, 0)
+        end_running(o, FAILED if o.kind == JOB and q.performs else REFUSED, a.refused, 0)
     d.fresh = d.edited = 0
     if a.soft:
         fail_softly(o, a.soft)
@@ -531,7 +540,7 @@ def judge(q: OperationParams, o: Operation) -> None:
     if o.running and not (o.kind == JOG and d.velocity != 0.0):
         o.within = o.within + 1 if a.near else 0
         o.outside = 0 if a.near else o.outside + 1
-        if o.within >= q.window_looks:
+        if o.within >= q.window_looks and not (o.kind == JOB and q.performs):  # there its moves are done one by one
             end_running(o, DONE, 0, 0)
         elif 0 < q.settle_looks <= o.outside:
             fail_softly(o, NOT_SETTLED)
