@@ -7,6 +7,7 @@ import os
 import random
 import shutil
 import signal
+import socket
 import sqlite3
 import ssl
 import stat
@@ -85,7 +86,7 @@ from detent.operate.trust import Trust, Why
 from detent.operate.words import CommandAbortedError, why_not_moving
 from detent.panel import app as panel_app
 from detent.panel.child import PanelPlace
-from detent.panel.gate import Rule
+from detent.panel.gate import MOST_STRANGERS, Rule
 from detent.panel.keys import LINK, ROLES, keep_keys, link_of, make_keys, sign
 from detent.planning import course
 from detent.planning.course import advance as advance_course
@@ -2873,6 +2874,23 @@ def test_47_a_page_sees_rows_of_its_own_channels(panel: PanelRig) -> None:
         assert "nobody watches" in one.ask(do="scope", channels=["lines.motor.count"])["error"]
         status = one.until("status")
         assert (status["clients"], status["holder"]) == (3, 0)
+
+
+@in_wall_time
+def test_52_connections_that_show_no_link_lock_nobody_out(panel: PanelRig) -> None:
+    """They are held open and say nothing; of more than so many the oldest goes, and whoever shows a link stays."""
+    known = panel.browser()
+    assert known.http.get("/").status_code == 200
+    with ExitStack() as held:
+        strangers = [held.enter_context(socket.create_connection(("127.0.0.1", panel.port), 10.0)) for _ in range(60)]
+        assert known.http.get("/").status_code == 200
+        assert panel.browser("viewer").http.get("/").status_code == 200
+        for one in strangers[: 60 - MOST_STRANGERS]:
+            with suppress(ConnectionResetError):
+                assert one.recv(1) == b""
+        last = strangers[-1]
+        last.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        assert last.recv(12) == b"HTTP/1.1 400"  # it is still listened to
 
 
 # ---- jobs

@@ -313,10 +313,11 @@ class Host:
         """Prepare a job and begin it."""
         return self.begin(self.prepared(job), client)
 
-    def begin(self, work: Work, client: int = 1) -> int:
+    def begin(self, work: Work, client: int = 1, epoch: int | None = None) -> int:
         """Begin a job; gives the id under which it will end. Its pieces are laid ready whenever the host takes note."""
         self.job = work
-        self._of_job = {"epoch": int(self.board.operation.epoch), "client": client}
+        known = int(self.board.operation.epoch) if epoch is None else epoch
+        self._of_job = {"epoch": known, "client": client}
         self._job_id, self._laid = self.ask(ops.JOB, work.pieces, **self._of_job), 0
         self._kept = int(self.board.loop.periods)
         return self._job_id

@@ -79,7 +79,7 @@ class Session:
         if word not in WORDS:
             raise DetentError(f"no command {word!r}; there are {', '.join((*WORDS, *PLACES))}")
         if word == "job":
-            return self._begin_job(value, speed, client)
+            return self._begin_job(value, speed, client, more)
         if word == "go_to" and (place := self._place_of(value)) is not None:
             word, value = "move_to", place
         if word == "stop":
@@ -100,7 +100,7 @@ class Session:
                 raise
             return self.host.settle(0)  # its line has done it
 
-    def _begin_job(self, value: object, speed: float, client: int) -> int:
+    def _begin_job(self, value: object, speed: float, client: int, known: Mapping[str, int]) -> int:
         """Read a job and begin it; one at a time, for it has one tray."""
         with self._jobs:
             with self._lock:
@@ -112,7 +112,7 @@ class Session:
             job = read_job(self.host.axis, self.host.load_job, value, self._leg)
             work = self.host.prepared(job, speed)  # may take a while: whoever wants to stop must not wait for it
             with self._lock:
-                return self.host.begin(work, client)
+                return self.host.begin(work, client, **known)
 
     def _leg(self, line: str) -> Leg:
         """A place of a job: a name or number that the axis knows, or where it is, as "5 mm"."""
