@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from detent.cli.app import NOT_DONE, Json, Set, app, option
-from detent.cli.terminal import print_json, tell
+from detent.cli.terminal import compiling_counted, print_json, tell
 from detent.errors import DetentError
 from detent.units import format_quantity
 
@@ -76,18 +76,13 @@ def live(
     at.check()
     place, where, (board, memory) = Place(file), None if no_store else store or beside(file), shared_memory()
     read = read_axis(file, overrides or [])
-    host, name = make_host(
-        file,
-        overrides or [],
-        motor=motor,
-        speed=speed,
-        period=_seconds(period),
-        store=where,
-        memory=memory,
-        drive=drive,
-    )
-    recorder = _record(host, record) if record else None
-    missing, left, watchdog = host.start(), Ending(), Watchdog(host.board, board)
+    with compiling_counted(quiet=as_json):
+        host, name = make_host(
+            file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where, memory=memory,
+            drive=drive,
+        )  # fmt: skip
+        recorder = _record(host, record) if record else None
+        missing, left, watchdog = host.start(), Ending(), Watchdog(host.board, board)
     about = {"name": name, "file": str(file), "simulated": host.link is None, "speed": speed}
     session = Session(host, about, _axis_file(read))
     status = session.status()
