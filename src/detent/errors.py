@@ -166,7 +166,7 @@ REFUSAL_TEXT: dict[int, str] = {
     31: "the target lies beyond a soft limit; name one between the limits",
     35: "the position is not known, so that only creeping by a way or by hand is allowed; home the axis",
     40: "nothing is heard from the drive for three periods of its heartbeat; check cable, supply and bus, then reset",
-    41: "whoever held the jog was silent for longer than its lease; hold it again",
+    41: "whoever held the jog, or led the job, was silent for longer than its lease; begin it again",
     43: "somebody else commands; take over first, or ask them",
     44: "a stop came after this was asked; look at the axis and ask again",
     50: "the loop came too late, for more than 5 periods or more than 3 times in a second, and the axis was stopped; "
@@ -185,7 +185,7 @@ REFUSAL_TEXT: dict[int, str] = {
     106: "not while the axis is enabled; switch it off first",
     107: "the axis takes no other move while one is under way; wait for its end, or stop it",
     108: "the axis is not ready: it has not yet taken its first position; wait a moment",
-    109: "no job is under way that this could be a piece of; begin the job first",
+    109: "no job is under way; begin one first",
     110: "the first motion since enabling has not been confirmed, and a job goes at speeds of its own; confirm first",
     111: "the axis moves, and where it is cannot be taught; wait until it rests, or stop it",
     112: "there is no change of the position table left to take back, or to make again; look at the table",

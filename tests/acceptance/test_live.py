@@ -7,6 +7,7 @@ import os
 import random
 import shutil
 import signal
+import socket
 import sqlite3
 import ssl
 import stat
@@ -83,10 +84,10 @@ from detent.operate.opening import meanings, store_path
 from detent.operate.session import Session
 from detent.operate.start import make_host
 from detent.operate.trust import Trust, Why
-from detent.operate.words import why_not_moving
+from detent.operate.words import CommandAbortedError, why_not_moving
 from detent.panel import app as panel_app
 from detent.panel.child import PanelPlace
-from detent.panel.gate import Rule
+from detent.panel.gate import MOST_STRANGERS, Rule
 from detent.panel.keys import LINK, ROLES, keep_keys, link_of, make_keys, sign
 from detent.planning import course
 from detent.planning.course import advance as advance_course
@@ -2080,9 +2081,9 @@ def test_46_positions_are_taught_typed_and_taken_back(tmp_path: Path) -> None:
     assert found["undone"] == pytest.approx(35.0, abs=1e-3)
     names = [line.split(",") for line in found["file"].splitlines()]
     assert {"left", "right"} < {cell for line in names for cell in line}
-    assert found["job"] == "Job done: 4 moves, every one inside its window."
+    assert found["job"] == "Job done: all of its moves."
     assert found["jobAt"] == pytest.approx(0.035, abs=1e-4)
-    assert "move 2 (9 m), refused" in found["badJob"]
+    assert "move 2: got 9 m" in found["badJob"]
 
 
 @pytest.mark.wide
@@ -2936,3 +2937,198 @@ def test_37_a_loop_that_swings_comes_to_rest():
     assert bench.operation.fault == 14
     assert bench.operation.trust == ops.REFERENCED
     assert "swings" in bench.host.axis.fault()
+
+
+@in_wall_time
+def test_52_connections_that_show_no_link_lock_nobody_out(panel: PanelRig) -> None:
+    """They are held open and say nothing; of more than so many the oldest goes, and whoever shows a link stays."""
+    known = panel.browser()
+    assert known.http.get("/").status_code == 200
+    with ExitStack() as held:
+        strangers = [held.enter_context(socket.create_connection(("127.0.0.1", panel.port), 10.0)) for _ in range(60)]
+        assert known.http.get("/").status_code == 200
+        assert panel.browser("viewer").http.get("/").status_code == 200
+        for one in strangers[: 60 - MOST_STRANGERS]:
+            with suppress(ConnectionResetError):
+                assert one.recv(1) == b""
+        last = strangers[-1]
+        last.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        assert last.recv(12) == b"HTTP/1.1 400"  # it is still listened to
+
+
+# ---- jobs
+
+
+def moved_job(*places: str, **more: Any) -> dict[str, Any]:
+    """A job as a page or a program says it."""
+    return {"moves": [*places], **more}
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_13_a_job_ends_once_and_its_moves_where_they_were_asked(name: str) -> None:
+    bench = Bench(name).enable()
+    session, ended = Session(bench.host, {}), bench.operation.endings
+    job = session.ask("job", moved_job("30 mm", "34 mm", rounds=2, rest=0.02), 0.5)
+    seen = list[float]()
+    while bench.host.ending(job) is None:
+        bench.host.keep_job()
+        bench.host.run(1)
+        seen.append(bench.answer.position)
+    assert bench.host.ending(job) == Ending(job, DONE, 0, 0)
+    assert [ended.id[k] for k in range(ended.count)].count(job) == 1
+    assert max(seen) == pytest.approx(0.034, abs=3e-4)
+    assert seen[-1] == pytest.approx(0.034, abs=2e-4)
+    assert sum((b - 0.032) * (a - 0.032) < 0 for a, b in pairwise(seen)) == 3  # two rounds
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_13_a_pause_holds_a_job_and_a_stop_empties_its_queue(name: str) -> None:
+    bench = Bench(name).enable()
+    session, o = Session(bench.host, {}), bench.operation
+    job = session.ask("job", moved_job(*["10 mm", "300 mm"] * 10), 0.5)
+    bench.pass_time(0.01)
+    while session.status()["job"]["done"] == 0 or bench.answer.position < 0.05:
+        bench.host.keep_job()
+        bench.host.run(1)  # on its way from 10 mm
+    assert session.wait(session.ask("pause", client=7)).how == "done"
+    bench.pass_time(0.5)
+    held, done = bench.answer.position, session.status()["job"]["done"]
+    assert bench.answer.rests
+    assert 0.05 < held < 0.25
+    bench.pass_time(1.0)
+    assert bench.answer.position == pytest.approx(held, abs=2e-4)
+    assert session.status()["job"] == {"name": "20 moves", "done": done, "of": 20, "paused": True}
+    assert ("a pause holds its job", "resume, or stop") in why_not_moving(session.status())
+    assert session.wait(session.ask("resume", client=7)).how == "done"
+    while session.status()["job"]["done"] == done:
+        bench.host.keep_job()
+        bench.host.run(1)
+    stopped = session.ask("stop")
+    assert session.wait(stopped).how == "done"
+    begun, place = int(bench.host.board.program.begun), bench.answer.position
+    bench.pass_time(3.0)
+    assert (int(o.running), int(bench.host.board.program.begun)) == (0, begun)
+    assert bench.answer.position == pytest.approx(place, abs=2e-4)
+    assert session.wait(job).how == "aborted"
+    assert session.wait(session.ask("resume")).code == ops.NO_JOB
+    second = session.ask("job", moved_job("12 mm"))
+    assert session.wait(second).how == "done"
+
+
+def test_18_a_job_that_nobody_keeps_stops_within_its_lease() -> None:
+    bench = Bench("cascade").enable()
+    job = Session(bench.host, {}).ask("job", moved_job(*["10 mm", "300 mm"] * 50), 0.2)
+    begin = int(bench.loop.periods)
+    while bench.host.ending(job) is None:
+        bench.host.run(1)
+    assert bench.host.ending(job) == Ending(job, ops.FAILED, ops.LEASE_LOST, 0)
+    assert (bench.loop.periods - begin) * bench.loop.period * 1e-9 == pytest.approx(2.0, abs=0.003)
+    bench.pass_time(1.0)
+    assert (bench.host.state, bench.answer.rests) == ("operation enabled", 1)
+
+
+def test_13_one_job_at_a_time_and_none_that_leaves_the_limits() -> None:
+    bench = Bench("cascade").enable()
+    session = Session(bench.host, {})
+    job = session.ask("job", str(EXAMPLES / "slide_moves.toml"))
+    second = session.ask("job", moved_job("12 mm"), client=2)
+    assert session.wait(second).code == ops.BUSY
+    bench.pass_time(0.01)
+    assert session.status()["job"]["name"] == "slide_moves.toml"
+    assert session.wait(job).how == "done"
+    with pytest.raises(DetentError, match="move 2: got 9 m"):
+        session.ask("job", moved_job("10 mm", "9 m"))
+    session.wait(session.ask("disable"))
+    assert session.wait(session.ask("job", moved_job("12 mm"))).code == ops.NOT_ENABLED
+
+
+def test_28_a_session_with_a_job_repeats_itself() -> None:
+    bench = Bench("filtered_servo").enable()
+    session = Session(bench.host, {})
+    job = session.ask("job", moved_job(*["10 mm", "12 mm"] * 50))  # more than the tray has places
+    bench.pass_time(0.3)
+    session.ask("pause")
+    bench.pass_time(0.2)
+    session.ask("resume")
+    assert session.wait(job).how == "done"
+    again = Bench("filtered_servo")
+    repeat(again.host, bench.host.log, int(bench.loop.periods))
+    assert bytes(again.host.axis.state) == bytes(bench.host.axis.state)
+
+
+@pytest.mark.compiled
+def test_24_the_table_does_a_job_of_numbers() -> None:
+    bench = Bench("rotary_table").enable()
+    session = Session(bench.host, {})
+    assert session.wait(session.ask("job", moved_job("1", "0", "30 deg", "1"))).how == "done"
+    assert bench.answer.position == pytest.approx(bench.spec.position["1"].angle, abs=2 * bench.grain)
+
+
+@pytest.mark.compiled
+def test_23_a_print_job_is_held_between_two_lines() -> None:
+    axis = Head(speed=10.0)
+    session = Session(axis.host, {})
+    job = session.ask("job", {"text": "detent\nholds\nits\nhead"})
+    axis.host.run(2)
+    while session.status()["job"]["done"] < 1:
+        axis.host.run(1)
+    session.ask("pause")
+    axis.host.run(100)  # a second of the axis: the line that had begun is printed
+    done = session.status()["job"]["done"]
+    assert 1 <= done <= 3
+    axis.host.run(100)
+    assert session.status()["job"]["done"] == done
+    assert axis.speed < 0.01
+    session.ask("resume")
+    assert session.wait(job).how == "done"
+    assert axis.printed().characters == 18
+
+
+@in_wall_time
+def test_18_a_job_of_a_stopped_program_ends_with_its_lease(folder: Path, running: live_processes.Running) -> None:
+    """SIGSTOP: the connection stays, nobody keeps the job; a program that is killed leaves at once."""
+    file = folder / "slide.toml"
+    for number, longest in ((signal.SIGSTOP, 2.6), (signal.SIGKILL, 0.6)):
+        with detent.connect(file) as axis:
+            axis.enable()
+            axis.confirm()
+        (folder / "moves.csv").write_text("target [mm],speed [mm/s],repeat\n10,20,\n40,20,500\n", encoding="ascii")
+        command = [sys.executable, "-m", "detent", "connect", str(file), "job", str(folder / "moves.csv")]
+        program = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        with detent.connect(file) as watcher:
+            until(watcher, lambda now: now["job"] is not None and not now["rests"])
+            os.kill(program.pid, number)
+            begin = watcher.status["loop"]["periods"]
+            ended = until(watcher, lambda now: now["running"] is None)
+            assert (ended["loop"]["periods"] - begin) * 1e-2 < longest
+            assert until(watcher, lambda now: now["rests"])["fault"] is None
+        os.kill(program.pid, signal.SIGKILL)
+        program.communicate()
+        with detent.connect(file) as axis:
+            until(axis, lambda now: now["client"] == 0)
+    running.end()
+
+
+@in_wall_time
+def test_56_a_job_is_led_held_and_stopped_from_terminals(folder: Path, running: live_processes.Running) -> None:
+    file = str(folder / "slide.toml")
+    (folder / "moves.csv").write_text("target [mm],dwell [ms]\n12,50\n40,\n10,\n", encoding="ascii")
+    with detent.connect(file) as axis:
+        axis.enable()
+        axis.confirm()
+    assert live_processes.run("connect", file, "pause").returncode == 1
+    done = live_processes.run("connect", file, "job", str(folder / "moves.csv"), "--json")
+    assert (done.returncode, json.loads(done.stdout)["ended"]["how"]) == (0, "done")
+    with detent.connect(file) as axis:
+        assert axis.position == pytest.approx(0.01, abs=1e-4)
+        job = axis.run_job(["12 mm", "40 mm"] * 50, wait=False)
+        assert live_processes.run("connect", file, "pause").returncode == 0
+        assert axis.status["job"]["paused"] is True
+        assert live_processes.run("connect", file, "resume").returncode == 0
+        assert axis.status["job"]["paused"] is False
+        assert live_processes.run("connect", file, "stop").returncode == 0
+        with pytest.raises(CommandAbortedError):
+            job.wait(5.0)
+    assert live_processes.run("connect", file, "job", str(folder / "none.csv")).returncode == 2
+    assert live_processes.run("connect", file, "job").returncode == 2
+    running.end()

@@ -57,7 +57,7 @@ found.job = await page.locator("#job-result").textContent();
 found.jobAt = (await status(page)).position;
 await page.fill("#job-places", "left\n9 m");
 await page.click("#job-run");
-await page.waitForFunction(() => /^Job (ended|refused)/.test(document.getElementById("job-result").textContent));
+await page.waitForFunction(() => /^Job (failed|refused)/.test(document.getElementById("job-result").textContent));
 found.badJob = await page.locator("#job-result").textContent();
 console.log(JSON.stringify({ ...found, problems: page.problems }));
 await chromium.close();

@@ -610,7 +610,7 @@ def test_the_first_run_says_that_it_compiles_and_the_second_does_not(tmp_path: P
     env = {"DETENT_CACHE_DIR": str(tmp_path / "cache")}
     first, second = (shell(*words, cwd=tmp_path, env=env) for _ in range(2))
     assert (first.status, second.status) == (0, 0)
-    assert first.err == "First run: compiling the axis, up to 15 s; later runs start immediately.\n"
+    assert first.err == "First run: compiling the axis, 10 to 60 s; later runs start immediately.\n"
     assert second.err == ""
     assert first.out == second.out
 

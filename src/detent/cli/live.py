@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from detent.cli.app import DONE, NOT_DONE, Json, Set, app, option
-from detent.cli.terminal import print_json, tell
+from detent.cli.terminal import compiling_counted, print_json, tell
 from detent.errors import DetentError
 from detent.units import format_quantity
 
@@ -35,7 +35,8 @@ PLAIN = "Serve the panel without TLS on a network; whoever is on it can then rea
 VIEWER = "Print a second link, for somebody who only looks, and may stop."
 WORD = (
     "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home; of the position "
-    "table: positions, teach, edit, rename, forget, undo, redo, export, import; inject, faults; link: to the panel."
+    "table: positions, teach, edit, rename, forget, undo, redo, export, import; job, pause, resume; inject, faults; "
+    "link: to the panel."
 )
 
 
@@ -74,13 +75,14 @@ def live(
     with ExitStack() as closing:
         place, where, (board, memory) = Place(file), None if no_store else store or beside(file), shared_memory()
         closing.callback(place.leave)
-        host, name = make_host(
-            file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where, memory=memory,
-            drive=drive,
-        )  # fmt: skip
-        if record:
-            closing.callback(_record(host, record).close)
-        missing, left = host.start(), Ending()
+        with compiling_counted(quiet=as_json):
+            host, name = make_host(
+                file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where, memory=memory,
+                drive=drive,
+            )  # fmt: skip
+            if record:
+                closing.callback(_record(host, record).close)
+            missing, left = host.start(), Ending()
         closing.callback(lambda: host.is_running and host.close())  # where what follows cannot begin
         watchdog = closing.enter_context(contextlib.closing(Watchdog(host.board, board)))
         about = {"name": name, "file": str(file), "simulated": host.link is None, "speed": speed}
@@ -252,6 +254,8 @@ def connect(
                 raise DetentError('connect: a jog needs a velocity such as "20 mm/s"')
             with axis.jog(value):
                 threading.Event().wait(seconds)
+        elif word == "job":
+            ended = _do_job(axis, value, speed)
         elif word not in ("status", "positions", "faults"):
             ended = axis.do(word, _about(word, value, second), speed, wait=False).wait().to_dict()
         if word in ("positions", *PLACES):
@@ -288,3 +292,14 @@ def _show_positions(table: list[dict[str, Any]], unit: str, *, as_json: bool) ->
              f"taught {row['taught']}{used}")  # fmt: skip
     if not table:
         tell("No positions yet; teach the first one with: detent connect FILE teach 1")
+
+
+def _do_job(axis: Any, path: str | None, speed: float) -> dict[str, Any]:
+    """Lead a job to its end; Ctrl-C stops it."""
+    if path is None:
+        raise DetentError("connect: got a job without a file; expected: one such as moves.csv; name it")
+    try:
+        return axis.run_job(path, speed=speed, wait=False).wait().to_dict()
+    except KeyboardInterrupt:
+        axis.stop()
+        raise

@@ -134,8 +134,31 @@ def say_compiling(why_unkept: str) -> None:
     if _QUIET[0]:
         return
     later = f"it cannot be cached ({why_unkept})" if why_unkept else "later runs start immediately"
-    sys.stderr.write(f"First run: compiling the axis, up to 15 s; {shown(later)}.\n")
+    sys.stderr.write(f"First run: compiling the axis, 10 to 60 s; {shown(later)}.\n")
     sys.stderr.flush()
+
+
+@contextmanager
+def compiling_counted(*, quiet: bool) -> Generator[None]:
+    """Seconds that pass, on a terminal, once the compiler has begun."""
+    from rich.progress import Progress, TextColumn, TimeElapsedColumn
+
+    from detent.kernel.cache import AT_FIRST_COMPILING
+
+    console = make_console(stderr=True)
+    if quiet or _QUIET[0] or not console.is_terminal:
+        yield
+        return
+    with Progress(TextColumn("compiling the loop"), TimeElapsedColumn(), console=console, transient=True) as bar:
+
+        def begin(_why: str) -> None:
+            bar.add_task("")
+
+        AT_FIRST_COMPILING.insert(0, begin)  # told last, below the line that says why
+        try:
+            yield
+        finally:
+            AT_FIRST_COMPILING[:] = [one for one in AT_FIRST_COMPILING if one is not begin]
 
 
 def split_names(texts: list[str] | None) -> list[str]:

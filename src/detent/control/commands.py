@@ -39,8 +39,10 @@ from detent.control.operation import (
     NOT_OFFERED,
     OFF,
     ORDER,
+    PAUSE,
     REFUSED,
     RESET,
+    RESUME,
     SECOND,
     STALE,
     STOP,
@@ -99,7 +101,7 @@ def obey(q: OperationParams, o: Operation, r: Request) -> None:
 @step
 def why_not(q: OperationParams, o: Operation, r: Request) -> int:
     """Reason to refuse a request, 0 for none; stop and off are never refused."""
-    if not (1 <= r.kind <= UPPER) or r.id < NEEDS_ID:
+    if not (1 <= r.kind <= RESUME) or r.id < NEEDS_ID:
         return UNKNOWN
     if not (abs(r.value) < 1e12 and 0.0 < r.speed <= 1.0):  # neither infinite nor no number
         return NOT_FINITE
@@ -107,7 +109,7 @@ def why_not(q: OperationParams, o: Operation, r: Request) -> int:
         return NOT_OFFERED
     if r.epoch != o.epoch:
         return STALE
-    if o.client not in (0, r.client) and r.kind != TAKE:
+    if o.client not in (0, r.client) and r.kind not in (TAKE, PAUSE, RESUME):  # who leads a job waits for its end
         return SECOND
     if r.kind == LEAVE:
         return 0
@@ -123,7 +125,7 @@ def why_not_now(q: OperationParams, o: Operation, r: Request) -> int:
         return why_not_move(q, o, r)
     if r.kind in (LOWER, UPPER):
         return 0 if can_move_end(q, o, r) else BEYOND
-    if r.kind == FEED:
+    if r.kind in (FEED, PAUSE, RESUME):
         return 0 if o.kind == JOB else NO_JOB
     if r.kind == TRUST and o.state == ENABLED:
         return MOVING
@@ -142,8 +144,10 @@ def manage(q: OperationParams, o: Operation, r: Request) -> None:
         o.state, o.fault = ordered(o.state, RESET_FAULT), 0
         leave_torque(o)
     elif r.kind == KEEP:
-        if o.kind == JOG:
-            o.lease = q.lease_looks
+        if o.kind in (JOG, JOB):
+            o.lease = q.lease_looks if o.kind == JOG else q.job_looks
+    elif r.kind in (PAUSE, RESUME):
+        o.paused = 1 if r.kind == PAUSE else 0
     elif r.kind == CONFIRM:
         o.confirmed = 1
     elif r.kind in (TAKE, LEAVE):

@@ -26,6 +26,7 @@ from detent.control.operation import (
     OperationParams,
     Request,
     end_running,
+    halt,
     tell,
 )
 from detent.kernel.step import hot_step, step
@@ -40,7 +41,7 @@ def why_not_move(q: OperationParams, o: Operation, r: Request) -> int:
         return BUSY
     if o.trust == NOT_KNOWN and r.kind in (MOVE_TO, GO, JOB):
         return UNREFERENCED
-    if r.kind == JOB and q.careful and not o.confirmed:  # it goes at speeds of its own
+    if r.kind == JOB and q.careful and not (o.confirmed or q.performs):  # it goes at speeds of its own
         return NOT_CONFIRMED
     if r.kind in (MOVE_TO, MOVE_BY) and not is_allowed(q, o, goal(o, r)):
         return BEYOND
@@ -102,7 +103,11 @@ def begin_motion(q: OperationParams, o: Operation, r: Request) -> None:
         tell(o, SEEK)
     elif r.kind == JOB:
         d.number, d.laid = round(r.value), 0
-        tell(o, WORK)
+        o.lease = q.job_looks
+        if q.performs == 0:
+            tell(o, WORK)
+        elif o.answer.rests == 0:
+            halt(o)
     else:
         d.target = goal(o, r)
         tell(o, TRAVEL)

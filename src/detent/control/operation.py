@@ -27,11 +27,11 @@ from detent.kernel.step import hot_step, step
 # ---- what may be asked
 (
     ENABLE, OFF, STOP, RESET, MOVE_TO, MOVE_BY, JOG, GO, HOME, KEEP, CONFIRM, TAKE, ORDER, TRUST, LEAVE, JOB, FEED,
-    LOWER, UPPER,
-) = COMMANDS = tuple(range(1, 20))  # fmt: skip
+    LOWER, UPPER, PAUSE, RESUME,
+) = COMMANDS = tuple(range(1, 22))  # fmt: skip
 COMMAND_NAMES = (
     "enable", "off", "stop", "reset", "move to", "move by", "jog", "go", "home", "keep", "confirm", "take", "order",
-    "trust", "leave", "job", "feed", "lower end", "upper end",
+    "trust", "leave", "job", "feed", "lower end", "upper end", "pause", "resume",
 )  # fmt: skip
 MANAGED = ENABLE, OFF, STOP, RESET, KEEP, CONFIRM, TAKE, ORDER, TRUST, LEAVE  # of every method; the others move it
 NEEDS_ID = 1  # smallest id of a command; 0 is none
@@ -71,6 +71,7 @@ class OperationParams(Registers):
 
     window_looks: i8 = register("looks inside the window until a command is done", unit="count")
     lease_looks: i8 = register("looks that a jog lives without being kept", unit="count")
+    job_looks: i8 = register("looks that a job lives without being kept", unit="count")
     settle_looks: i8 = register("looks at rest outside the window that are a fault; 0 never", unit="count")
     lowest: f8 = register("lower soft limit", unit="m")
     highest: f8 = register("upper soft limit", unit="m")
@@ -79,6 +80,7 @@ class OperationParams(Registers):
     creep: f8 = register("share of the largest speed while the position is not known", unit="1")
     one_at_a_time: u1 = register("1: a move under way must end before another begins")
     takes: i8 = register("what the method offers: a bit per command", unit="code")
+    performs: u1 = register("1: the moves of a job are made here; 0: the method does jobs in a way of its own")
 
 
 class Demand(Registers):
@@ -135,7 +137,8 @@ class Operation(Registers):
     kind: u1 = register("what it is", unit="code")
     within: i8 = register("looks in the window, the commanded point at rest", unit="count")
     outside: i8 = register("looks outside it, the commanded point at rest", unit="count")
-    lease: i8 = register("looks until an unkept jog is stopped", unit="count")
+    lease: i8 = register("looks until an unkept jog or job is stopped", unit="count")
+    paused: u1 = register("1 while the job that is under way is held")
     client: i8 = register("who commands, 0 nobody", unit="code")
     fault: u2 = register("first fault since the last reset, 0 none", unit="code")
     confirmed: u1 = register("1 once the first motion since enabling has been confirmed")
@@ -173,7 +176,7 @@ def end_running(o: Operation, how: int, why: int, by: int) -> None:
     if o.running:
         end(o, o.running, how, why, by)
     o.running = o.kind = 0
-    o.within = o.outside = o.lease = 0
+    o.within = o.outside = o.lease = o.paused = 0
 
 
 @hot_step
@@ -264,7 +267,7 @@ def lose_torque(o: Operation, code: int) -> None:
 
 @step
 def look(o: Operation) -> None:
-    """One look before the method's: the drive's own transitions, faults, and the lease of a jog."""
+    """One look before the method's: the drive's own transitions, faults, and the lease of a jog or a job."""
     o.looks += 1
     a = o.answer
     if o.state == NOT_READY:
@@ -275,7 +278,7 @@ def look(o: Operation) -> None:
             leave_torque(o)
     if a.fault and (o.state != FAULT or o.softly):  # its torque has gone, also from where a ramp has led to
         fail(o, a.fault)
-    if o.kind == JOG and o.lease > 0:
+    if o.kind in (JOG, JOB) and o.lease > 0:
         o.lease -= 1
         if o.lease == 0:
             end_running(o, FAILED, LEASE_LOST, 0)
@@ -287,7 +290,7 @@ def judge(q: OperationParams, o: Operation) -> None:
     """After the method has answered: did it take the demand, and is the command done."""
     a, d = o.answer, o.demand
     if a.refused:  # in the look in which it was told, or later: a controller may need time to find out
-        end_running(o, REFUSED, a.refused, 0)
+        end_running(o, FAILED if o.kind == JOB and q.performs else REFUSED, a.refused, 0)
     d.fresh = d.edited = 0
     if a.soft:
         fail_softly(o, a.soft)
@@ -302,7 +305,7 @@ def judge(q: OperationParams, o: Operation) -> None:
     if o.running and not (o.kind == JOG and d.velocity != 0.0):
         o.within = o.within + 1 if a.near else 0
         o.outside = 0 if a.near else o.outside + 1
-        if o.within >= q.window_looks:
+        if o.within >= q.window_looks and not (o.kind == JOB and q.performs):  # there its moves are done one by one
             end_running(o, DONE, 0, 0)
         elif 0 < q.settle_looks <= o.outside:
             fail_softly(o, NOT_SETTLED)

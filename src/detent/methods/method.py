@@ -13,7 +13,7 @@ from functools import cached_property, partial
 from importlib import import_module
 from operator import attrgetter
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
 
 from detent.axisfile.catalogue import Catalogue
 from detent.axisfile.tables import AxisSpec
@@ -125,6 +125,9 @@ class Live:
     """Places for pieces of a job in what the loop shares, a row each; None where it does no jobs."""
     numbers: frozenset[int] | None = None  # of positions that the method itself knows; None where it knows none
     work: "Callable[[Any], Work] | None" = None  # a job as pieces for the tray
+    legs: "Callable[[Any], Sequence[Leg]] | None" = None
+    """A job as moves that the operation makes one after another, where the method does jobs in no way of its own."""
+    text: Callable[[str], Any] | None = None  # a text as a job, where it prints
     places: "Mapping[str, Place]" = field(default_factory=dict[str, Any])
     """Where faults can be injected; nowhere where the machine is none that is simulated."""
     limits: Mapping[int, float] = field(default_factory=dict[int, float])
@@ -158,20 +161,35 @@ class Wiring:
     hardware: str  # what the axis file says that the drive says of itself; empty where it says nothing
 
 
+class Leg(NamedTuple):
+    """A move of a job: its kind (`control.operation`), 0 for a rest alone; to where, by what way, at what velocity."""
+
+    kind: int
+    value: float = 0.0
+    speed: float | None = None  # largest [m/s] or [rad/s]; None for the axis's own
+    seconds: float = 0.0  # of rest after it; of a jog, how long it lasts
+
+
 class Work(Protocol):
     """A job done live: the host lays piece after piece ready, and the loop takes them."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        ...
 
     @property
     def pieces(self) -> int:
         """How many it has."""
         ...
 
-    def piece(self) -> bytes | None:
-        """The next piece as a row of the tray; None where none is left, or none may be laid yet."""
+    @property
+    def done(self) -> int:
+        """How many of them have ended."""
         ...
 
-    def result(self) -> Result:
-        """What came of it so far."""
+    def piece(self) -> bytes | None:
+        """The next piece as a row of the tray; None where none is left, or none may be laid yet."""
         ...
 
 

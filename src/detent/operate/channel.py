@@ -14,7 +14,8 @@ import os
 import socket
 import struct
 import threading
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -25,11 +26,12 @@ from typing import Any, cast
 from detent.errors import AxisError, DetentError
 from detent.files.text import shown
 from detent.operate.audit import Audit
-from detent.operate.session import Session, packed
+from detent.operate.session import LINES, Session, packed
 from detent.operate.words import DURABLE, Ended, why_not_moving
 
 LONGEST = 1 << 16  # bytes of a message
 MOST_CLIENTS = 32
+MOST_BEHIND = 256  # messages of a client that wait behind one that waits for a disk
 MOST_WAITING = 1 << 20  # bytes that a client has not read until it is dropped
 SLOW = 1 << 16  # bytes that it has not read until it is sent no rows
 LEAVING = 0.5  # for what is still to be sent to a client that leaves [s]
@@ -77,6 +79,9 @@ class Client:
     open: set[int] = field(default_factory=set[int])  # commands that have not ended
     told: set[int] = field(default_factory=set[int])  # those of them that stand in the log
     watch: asyncio.Future[None] | None = None
+    behind: deque[tuple[bytes, int]] = field(default_factory=deque[tuple[bytes, int]])
+    """Messages that wait for their turn, each with the number of stops when it came."""
+    turn: asyncio.Future[None] | None = None  # what answers them
 
 
 class Channel:
@@ -132,14 +137,15 @@ class Channel:
         try:
             with suppress(ConnectionError, asyncio.CancelledError, ValueError, asyncio.LimitOverrunError):
                 while line := await reader.readline():
-                    if waits_for_disk(line):  # the stop of another client does not
-                        answer = await asyncio.to_thread(self._answer, line, client)
-                    else:
-                        answer = self._answer(line, client)
-                    if not _send(writer, answer):
+                    self._take(line, client)
+                    if writer.is_closing():
                         break
         finally:
             telling.cancel()
+            client.behind.clear()
+            if client.turn is not None:  # what it has begun ends before it leaves, or nobody would have asked for it
+                with suppress(asyncio.CancelledError):
+                    await client.turn
             self._watch_no_more(client)
             del self._clients[client.number]
             with suppress(BlockingIOError):  # the lease of a jog runs out by itself
@@ -150,8 +156,32 @@ class Channel:
             except (OSError, TimeoutError, asyncio.CancelledError):
                 writer.transport.abort()
 
-    def _answer(self, line: bytes, client: Client) -> dict[str, Any]:
-        """What a message is answered."""
+    def _take(self, line: bytes, client: Client) -> None:
+        """Answer a message, in its turn; a stop overtakes what waits for a disk."""
+        epoch = int(self.session.host.board.operation.epoch)
+        is_free = client.turn is None or client.turn.done()
+        if asks_for(line, LINES) or (is_free and not waits_for_disk(line)):
+            _send(client.writer, self._answer(line, client, epoch))
+            return
+        if len(client.behind) >= MOST_BEHIND:
+            told = {"error": f"{MOST_BEHIND} messages wait already; wait for answers (a stop is always taken)"}
+            _send(client.writer, _mark_of(line) | told)
+            return
+        client.behind.append((line, epoch))
+        if is_free:
+            client.turn = asyncio.ensure_future(self._answer_in_turn(client))
+
+    async def _answer_in_turn(self, client: Client) -> None:
+        while client.behind:
+            line, epoch = client.behind.popleft()
+            if waits_for_disk(line):
+                answer = await asyncio.to_thread(self._answer, line, client, epoch)
+            else:
+                answer = self._answer(line, client, epoch)
+            _send(client.writer, answer)
+
+    def _answer(self, line: bytes, client: Client, epoch: int | None = None) -> dict[str, Any]:
+        """What a message is answered; `epoch`: the stops that whoever asks knew of."""
         try:
             read: Any = json.loads(line)
         except (ValueError, RecursionError):
@@ -159,11 +189,11 @@ class Channel:
         asked = cast("dict[str, Any]", read if isinstance(read, dict) else {})
         mark = {"as": asked.pop("as")} if "as" in asked else {}
         try:
-            return mark | self._done(asked, client)
+            return mark | self._done(asked, client, {} if epoch is None else {"epoch": epoch})
         except DetentError as error:
             return mark | {"error": str(error)}
 
-    def _done(self, asked: dict[str, Any], client: Client) -> dict[str, Any]:
+    def _done(self, asked: dict[str, Any], client: Client, known: dict[str, int]) -> dict[str, Any]:
         do = asked.pop("do", None)
         if not isinstance(do, str):
             raise DetentError('a message is an object with "do", a command, and perhaps "value" and "speed", a number')
@@ -174,17 +204,17 @@ class Channel:
             return {do: _told(own[do], client, asked)}
         who = str(asked.pop("who", client.who))
         try:
-            return {"id": self._command(do, asked, client, who)}
+            return {"id": self._command(do, asked, client, who, known)}
         except DetentError as error:
             self.audit.note(who, client=client.number, do=do[:40], error=str(error)[:200])
             raise
 
-    def _command(self, do: str, asked: dict[str, Any], client: Client, who: str) -> int:
+    def _command(self, do: str, asked: dict[str, Any], client: Client, who: str, known: dict[str, int]) -> int:
         value, speed = asked.get("value"), asked.get("speed", 1.0)
         if isinstance(speed, bool) or not isinstance(speed, int | float) or abs(speed) > 1e300:
             raise DetentError(f"speed {speed!r:.60}: expected a number above 0 to 1, a share of the largest speed")
         try:
-            command = self.session.ask(do, value, float(speed), client=client.number)
+            command = self.session.ask(do, value, float(speed), client=client.number, **known)
         except BlockingIOError as error:
             raise DetentError("too many commands at once") from error
         client.open.add(command)
@@ -258,9 +288,34 @@ class Channel:
             await asyncio.sleep(LOOK)
 
 
+def names(line: bytes, words: Collection[str]) -> bool:
+    """Whether a message has one of these words."""
+    return any(f'"{word}"'.encode() in line for word in words)
+
+
 def waits_for_disk(line: bytes) -> bool:
     """Whether a message may ask for something that is durable before it is done."""
-    return any(f'"{word}"'.encode() in line for word in DURABLE)
+    return names(line, DURABLE) and not asks_for(line, LINES)
+
+
+def asks_for(line: bytes, words: Collection[str]) -> bool:
+    """Whether a message asks for one of these."""
+    return names(line, words) and _read(line).get("do") in words
+
+
+def _read(line: bytes) -> dict[str, Any]:
+    """An object that came as a line; empty where something else did."""
+    try:
+        read: Any = json.loads(line)
+    except (ValueError, RecursionError):
+        return {}
+    return cast("dict[str, Any]", read) if isinstance(read, dict) else {}
+
+
+def _mark_of(line: bytes) -> dict[str, Any]:
+    """The mark under which a message is answered."""
+    said = _read(line)
+    return {"as": said["as"]} if "as" in said else {}
 
 
 def _told(answer: Callable[..., Any], about: object, asked: dict[str, Any]) -> Any:

@@ -10,13 +10,16 @@
 
 import asyncio
 import threading
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol, Self
 
+from detent.errors import DetentError
 from detent.operate.words import ERRORS, Ended, describe_status, why_not_moving
 
 KEEP = 0.05  # how often a jog is kept [s]
+KEEP_JOB = 0.5  # the same of a job
 
 
 class Link(Protocol):
@@ -211,6 +214,39 @@ class LiveAxis:
     def home(self, *, wait: bool = True) -> Command:
         """Find the reference."""
         return self.do("home", wait=wait)
+
+    def run_job(
+        self, job: str | Path | Sequence[str] | Mapping[str, Any], *, speed: float = 1.0, wait: bool = True
+    ) -> Command:
+        """Do a job: a file, a list of places such as ``["5 mm", "load"]``, or of a printer ``{"text": "..."}``.
+
+        It lives for as long as this process keeps it: when that is gone, or silent for 2 s, the axis stops.
+        """
+        said = str(Path(job).absolute()) if isinstance(job, str | Path) else job
+        said = {"moves": list(said)} if isinstance(said, list | tuple) else said
+        command = self.do("job", said, speed, wait=False)
+        left = threading.Event()
+
+        def keep() -> None:
+            with suppress(DetentError):  # the axis has gone, or this process has left it
+                while not left.wait(KEEP_JOB) and not command.done:
+                    self.link.ask("keep")
+
+        threading.Thread(target=keep, name="job", daemon=True).start()
+        if wait:
+            try:
+                command.wait()
+            finally:
+                left.set()
+        return command
+
+    def pause(self) -> Command:
+        """Hold the job that is under way: it comes to rest."""
+        return self.do("pause")
+
+    def resume(self) -> Command:
+        """Go on with it."""
+        return self.do("resume")
 
     @contextmanager
     def jog(self, velocity: float | str) -> Generator[Command]:

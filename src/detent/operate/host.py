@@ -8,7 +8,9 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from mmap import mmap
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ from detent.errors import NO_MARK, OTHER_HARDWARE, DetentError
 from detent.methods.method import Live, Method, Work
 from detent.operate.drivers.driver import Driver, Link
 from detent.operate.faults import Faults
+from detent.operate.jobs import Moves
 from detent.operate.keeper import Keeper
 from detent.operate.loop import INBOX, PULLS, Board, run_loop
 from detent.operate.realtime import ask_for_time, give_back
@@ -30,6 +33,8 @@ from detent.operate.store import Store
 
 PERIOD = 1e-3  # of the loop [s]
 LEASE = 0.2  # time that a jog lives without being kept [s]
+JOB_LEASE = 2.0  # the same of a job [s]
+JOB_KEEP = 0.5  # how often who leads a job keeps it [s]
 LEAST_WINDOW = 0.02  # shortest time in the window until a command is done [s]
 KEPT = 2048  # endings, and in wall time requests, that memory holds
 SETTLE = 2.0  # time that an axis may be outside its window at the end of a motion [s]
@@ -102,8 +107,8 @@ class Log:
         return log
 
 
-def operation_params(**more: Any) -> Any:
-    """Give a method what it fills its `OperationParams` with.
+def operation_params(speed: float = 1.0, **more: Any) -> Any:
+    """Give a method what it fills its `OperationParams` with; `speed` is how fast the axis's time passes.
 
     That is ``make(look, window, (lowest, highest), *motions)``: time between two looks and time in the window [s], the
     soft limits, and the motions that it offers.
@@ -111,12 +116,13 @@ def operation_params(**more: Any) -> Any:
 
     def make(look: float, window: float, limits: tuple[float, float], *motions: int) -> OperationParams:
         """Fill it for a method that looks so often, has such limits and offers these motions."""
-        takes = sum(1 << kind for kind in (*ops.MANAGED, *motions))
+        takes = sum(1 << kind for kind in {*ops.MANAGED, *motions, ops.JOB, ops.FEED, ops.PAUSE, ops.RESUME})
         looks = math.ceil(max(window, LEAST_WINDOW) / look - 1e-9)
-        lease = math.floor(LEASE / look + 1e-9)
+        lease, job = (math.floor(time * speed / look + 1e-9) for time in (LEASE, JOB_LEASE))  # of who asks
         return OperationParams(
-            window_looks=looks, lease_looks=lease, settle_looks=math.ceil(SETTLE / look), lowest=limits[0],
-            highest=limits[1], takes=takes, creep=0.1, **more
+            window_looks=looks, lease_looks=lease, job_looks=job,
+            settle_looks=math.ceil(SETTLE / look), lowest=limits[0], highest=limits[1], takes=takes,
+            performs=int(ops.JOB not in motions), creep=0.1, **more
         )  # fmt: skip
 
     return make
@@ -133,7 +139,7 @@ class Host:
         wall: bool = True, careful: bool = True, channels: Sequence[str] = (), store: Store | None = None,
         stated: bool = True, memory: mmap | None = None, driver: Driver | None = None,
     ) -> None:  # fmt: skip
-        make = operation_params(careful=int(careful))
+        make = operation_params(speed, careful=int(careful))
         self.method = method.name
         self.board: Any = Board() if memory is None else Board.from_buffer(memory)
         self.link: Link | None = None
@@ -160,9 +166,12 @@ class Host:
         self._store, self._stated, self._asking = store, stated, threading.Lock()
         self._ended: dict[int, Ending] = {}
         self._forgotten = 0  # id of the last one that is not among them any more
+        self.load_job: Callable[[Path], Any] = partial(method.load, spec)
         self.job: Work | None = None  # the last one begun
         self._of_job: dict[str, int] = {}
-        self._job_id = self._laid = 0
+        self._job_id = self._laid = self._kept = 0
+        tray: Any = self.board.program.tray.pieces
+        self._tray = self.axis.tray if self.axis.tray is not None else np.ctypeslib.as_array(tray).view(np.uint8)
 
     # ---- the loop
 
@@ -294,14 +303,34 @@ class Host:
         self._ended[command] = Ending(command, ops.REFUSED if why else ops.DONE, why, 0)
         return command
 
+    def prepared(self, job: Any, speed: float = 1.0) -> Work:
+        """A job as pieces, and how far it has come; `speed` is a share of the largest, of jobs that are moves."""
+        return Moves(job, self.axis, self.board, speed) if self.axis.work is None else self.axis.work(job)
+
+    @property
+    def works(self) -> bool:
+        """True while a job is under way, or has been asked for."""
+        return self._job_id > 0 and self.ending(self._job_id) is None
+
     def work(self, job: Any, client: int = 1) -> int:
+        """Prepare a job and begin it."""
+        return self.begin(self.prepared(job), client)
+
+    def begin(self, work: Work, client: int = 1, epoch: int | None = None) -> int:
         """Begin a job; gives the id under which it will end. Its pieces are laid ready whenever the host takes note."""
-        if self.axis.work is None:
-            raise DetentError("got a job; expected: commands without one, for this axis does none live; ask for moves")
-        self.job = self.axis.work(job)
-        self._of_job = {"epoch": int(self.board.operation.epoch), "client": client}
-        self._job_id, self._laid = self.ask(ops.JOB, self.job.pieces, **self._of_job), 0
+        self.job = work
+        known = int(self.board.operation.epoch) if epoch is None else epoch
+        self._of_job = {"epoch": known, "client": client}
+        self._job_id, self._laid = self.ask(ops.JOB, work.pieces, **self._of_job), 0
+        self._kept = int(self.board.loop.periods)
         return self._job_id
+
+    def keep_job(self) -> None:
+        """Without a wall clock, time passes only while somebody waits: that one keeps the job, when it is due."""
+        loop, o = self.board.loop, self.board.operation
+        if o.kind == ops.JOB and (loop.periods - self._kept) * loop.period * 1e-9 >= JOB_KEEP:
+            self._kept = int(loop.periods)
+            self.ask(ops.KEEP, client=int(o.client))
 
     def _feed(self) -> None:
         """Lay pieces ready, as far as the job gives them; the loop sees each when it takes the request for it."""
@@ -315,8 +344,8 @@ class Host:
 
     def lay(self, piece: bytes, number: int) -> None:
         """Put a piece of a job, the first has number 1, in its place; nobody looks there before a request says so."""
-        tray: Any = self.axis.tray
-        tray[(number - 1) % len(tray)] = np.frombuffer(piece, np.uint8)
+        places: Any = self._tray.reshape(-1, len(piece))
+        places[(number - 1) % len(places)] = np.frombuffer(piece, np.uint8)
         self.log.add_piece(piece)
 
     def _has_room(self) -> bool:
@@ -375,6 +404,7 @@ class Host:
             found = self.ending(command)
             if found is not None:
                 return found
+            self.keep_job()
             self.run(1)
         raise TimeoutError(f"command {command} has not ended within {periods} periods")
 

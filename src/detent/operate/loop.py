@@ -28,6 +28,7 @@ from detent.control.operation import (
     off,
     stop,
 )
+from detent.control.program import Program, perform
 from detent.errors import LOOP_DEAD, LOOP_OVERRUN
 from detent.kernel.clock import monotonic_ns, sleep_until
 from detent.kernel.compiled import byte_at
@@ -126,6 +127,7 @@ class Board(Registers):
     simulated: u1 = register("1 where the machine is simulated, and faults can be injected")
     injection: Injection = block("fault between machine and wires")
     faults: FaultNotes = block("faults so far")
+    program: Program = block("job that the operation leads")
 
 
 @step
@@ -210,6 +212,7 @@ def look_once(p: Any, r: Any, q: Any, memory: Any, b: Board, *feed: Any) -> None
     look(o)
     run_serve(q, p.controller, r.controller, r.lines, memory, o, *feed)
     judge(q.operation, o)
+    perform(q.operation, o, b.program)
 
 
 @step

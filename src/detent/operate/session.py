@@ -8,8 +8,10 @@ from typing import Any, cast
 
 from detent.control import operation as ops
 from detent.errors import NO_MARK, DetentError
+from detent.methods.method import Leg
 from detent.operate.faults import injection_of, injections
 from detent.operate.host import Host
+from detent.operate.jobs import read_job
 from detent.operate.loop import Board
 from detent.operate.places import Places
 from detent.operate.scope import CHANNELS, SHOWN, Rows
@@ -29,6 +31,7 @@ class Session:
         self.host, self.about, self._file = host, dict(about), dict(file or {})
         self.unit = host.axis.unit
         self._lock, self._left, self._places = threading.Lock(), threading.Event(), Places(host)
+        self._jobs = threading.Lock()
         self._signals = self._name_signals()
         if host.is_running:
             threading.Thread(target=self._keep_noting, name="notes", daemon=True).start()
@@ -53,7 +56,9 @@ class Session:
         facts = [] if self.host.link is None else [str(fact) for fact in self.host.link.facts]
         return self.about | {
             "unit": self.unit, "period": period, "commands": words, "limits": limits, "channels": channels,
-            "injections": can_inject, "method": self.host.method, "max_speed": self.host.axis.speed,
+            "injections": can_inject, "prints": self.host.axis.text is not None,
+            "numbers": sorted(self.host.axis.numbers or ()), "method": self.host.method,
+            "max_speed": self.host.axis.speed,
             "view": dict(self.host.axis.view), "drive": facts,
         }  # fmt: skip
 
@@ -73,6 +78,8 @@ class Session:
             return self.host.settle(self._places.do(word, value, client))
         if word not in WORDS:
             raise DetentError(f"no command {word!r}; there are {', '.join((*WORDS, *PLACES))}")
+        if word == "job":
+            return self._begin_job(value, speed, client, more)
         if word == "go_to" and (place := self._place_of(value)) is not None:
             word, value = "move_to", place
         if word == "stop":
@@ -92,6 +99,28 @@ class Session:
             if word not in LINES:
                 raise
             return self.host.settle(0)  # its line has done it
+
+    def _begin_job(self, value: object, speed: float, client: int, known: Mapping[str, int]) -> int:
+        """Read a job and begin it; one at a time, for it has one tray."""
+        with self._jobs:
+            with self._lock:
+                busy = self.host.works
+            if busy:
+                return self.host.settle(ops.BUSY)
+            if not 0.0 < speed <= 1.0:
+                return self.host.settle(ops.NOT_FINITE)
+            job = read_job(self.host.axis, self.host.load_job, value, self._leg)
+            work = self.host.prepared(job, speed)  # may take a while: whoever wants to stop must not wait for it
+            with self._lock:
+                return self.host.begin(work, client, **known)
+
+    def _leg(self, line: str) -> Leg:
+        """A place of a job: a name or number that the axis knows, or where it is, as "5 mm"."""
+        numbers = self.host.axis.numbers
+        if numbers is not None and line.isdecimal() and int(line) in numbers:
+            return Leg(ops.GO, float(line))
+        place = self._place_of(line) if self._places.has(line) else value_of(WORDS["move_to"], line, self.unit)
+        return Leg(ops.MOVE_TO, 0.0 if place is None else place)
 
     def faults(self) -> list[dict[str, Any]]:
         """The last faults, the first of them first."""
@@ -150,6 +179,7 @@ class Session:
             if self.host.is_running:
                 pause.wait(STEP)
             else:
+                self.host.keep_job()
                 self.host.run(1)
             waited += STEP
         return found

@@ -35,6 +35,9 @@ WORDS = {
     "keep": Word(ops.KEEP, help="go on with the jog"),
     "go_to": Word(ops.GO, "number", "to a numbered position"),
     "home": Word(ops.HOME, help="find the reference"),
+    "job": Word(ops.JOB, "job", "moves of a file or a list, one after another, or what the axis prints"),
+    "pause": Word(ops.PAUSE, help="the job that is under way comes to rest, and is held"),
+    "resume": Word(ops.RESUME, help="go on with it"),
     "take": Word(ops.TAKE, help="take over the command; a motion under way is stopped first"),
     "trust": Word(ops.TRUST, "number", "0 position unknown, 1 restored, 2 referenced"),
     "leave": Word(ops.LEAVE, help="command no longer; a motion under way is stopped"),
@@ -51,7 +54,7 @@ PLACES = {
 }  # fmt: skip
 """What is done with the position table: nothing of it moves the axis."""
 
-DURABLE = "enable", "order", "go_to", "positions", *PLACES  # that may have to wait until something is on a disk
+DURABLE = "enable", "order", "go_to", "job", "positions", *PLACES  # that may have to wait for a disk
 
 
 class CommandError(AxisError):
@@ -145,6 +148,7 @@ def status_of(host: Any, fault: str) -> dict[str, Any]:
         "fault": {"code": int(o.fault), "text": fault or REFUSAL_TEXT.get(o.fault, "")} if o.fault else None,
         "barred": {"code": int(o.barred), "text": host.told(o.barred) or REFUSAL_TEXT[o.barred]} if o.barred else None,
         "running": {"id": int(o.running), "command": kind} if o.running else None, "epoch": int(o.epoch),
+        "job": _job_of(host) if o.kind == ops.JOB else None,
         "client": int(o.client), "last_stop": o.last_stop,
         "loop": {
             "periods": int(loop.periods), "skipped": int(loop.skipped), "overruns": int(loop.overruns),
@@ -153,6 +157,14 @@ def status_of(host: Any, fault: str) -> dict[str, Any]:
             "longest_work": loop.longest * 1e-9, "late": [int(n) for n in loop.late],
         },
     }  # fmt: skip
+
+
+def _job_of(host: Any) -> dict[str, Any]:
+    """How far the job has come that is under way."""
+    return {
+        "name": host.job.name, "done": host.job.done, "of": host.job.pieces,
+        "paused": bool(host.board.operation.paused),
+    } if host.job else {"name": "", "done": 0, "of": 0, "paused": False}  # fmt: skip
 
 
 def why_not_moving(status: dict[str, Any], client: int = 0) -> list[tuple[str, str]]:
@@ -165,6 +177,8 @@ def why_not_moving(status: dict[str, Any], client: int = 0) -> list[tuple[str, s
         found.append(("the position is not known: it creeps, and goes to no position", status["find"]))
     if status["store"] and status["store"]["trouble"]:
         found.append((f"what survives cannot be kept: {status['store']['trouble']}", "give its disk room, then enable"))
+    if status["job"] and status["job"]["paused"]:
+        found.append(("a pause holds its job", "resume, or stop"))
     if enabled and not status["confirmed"]:
         found.append(("the first motion is held to a tenth of the speed", "look at it, then confirm"))
     if status["at_end"]:

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from detent.panel.app import Panel
-from detent.panel.gate import Here, local_names
+from detent.panel.gate import Here, Strangers, local_names
 from detent.panel.keys import Keys
 from detent.panel.sockets import LONGEST_FRAME
 
@@ -39,6 +40,21 @@ def listen(addresses: Sequence[str], port: int) -> list[socket.socket]:
     return found
 
 
+def watched(strangers: Strangers) -> type[H11Protocol]:
+    """The protocol of a connection, by which whoever has not shown a link is counted."""
+
+    class Watched(H11Protocol):
+        def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+            super().connection_made(transport)
+            strangers.come(self.client, transport)
+
+        def connection_lost(self, exc: Exception | None) -> None:
+            strangers.let_in(self.client)
+            super().connection_lost(exc)
+
+    return Watched
+
+
 def make_server(told: dict[str, Any]) -> tuple[uvicorn.Server, list[socket.socket], Panel]:
     """A server, what it listens on, and what it serves."""
     tls = {"ssl_certfile": told["certificate"], "ssl_keyfile": told["key_file"]} if told["certificate"] else {}
@@ -48,7 +64,7 @@ def make_server(told: dict[str, Any]) -> tuple[uvicorn.Server, list[socket.socke
     panel = Panel(Path(told["channel"]), Keys(told["keys"]), here, plain=told["plain"])
     config = uvicorn.Config(
         panel.app(), log_level="warning", access_log=False, proxy_headers=False, server_header=False, lifespan="on",
-        ws="websockets-sansio", http="h11", ws_max_size=LONGEST_FRAME, ws_per_message_deflate=False,
+        ws="websockets-sansio", http=watched(panel.strangers), ws_max_size=LONGEST_FRAME, ws_per_message_deflate=False,
         ws_ping_interval=5.0, ws_ping_timeout=5.0, timeout_graceful_shutdown=1, **tls,
     )  # fmt: skip
     config.load()  # the certificate, too

@@ -22,7 +22,7 @@ from starlette.websockets import WebSocket
 
 from detent.errors import DetentError
 from detent.methods.registry import METHODS
-from detent.panel.gate import Gate, Here, Rule, person, place_of
+from detent.panel.gate import Gate, Here, Rule, Strangers, person, place_of
 from detent.panel.keys import COOKIE, LIFETIMES, LINK, TICKET, Keys
 from detent.panel.line import Line
 from detent.panel.sockets import Budget, Sockets
@@ -54,6 +54,7 @@ class Panel:
         self.channel, self.keys, self.here, self.plain = channel, keys, here, plain
         self.sockets = Sockets(channel, keys)
         self.line: Line | None = None
+        self.strangers = Strangers()
         self._wrong_links = Budget(10, 60.0)  # that the log tells
         self.about: dict[str, Any] = {}
         loader = PackageLoader("detent.panel", "template")
@@ -73,7 +74,7 @@ class Panel:
             Route("/api/positions.csv", self.positions),
             Route("/api/scope.csv", self.scope),
         ]
-        gate = Middleware(Gate, routes=routes, rules=RULES, keys=self.keys, here=self.here)
+        gate = Middleware(Gate, routes=routes, rules=RULES, keys=self.keys, here=self.here, strangers=self.strangers)
         return Starlette(
             routes=routes, middleware=[gate], lifespan=self._attached, exception_handlers={DetentError: _told}
         )

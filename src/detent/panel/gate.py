@@ -3,7 +3,7 @@
 import ipaddress
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from http.cookies import CookieError, SimpleCookie
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import HTTPConnection
@@ -13,6 +13,7 @@ from starlette.routing import BaseRoute, Match
 from detent.panel.keys import COOKIE, Keys, Pass
 
 MOST_BODY = 1 << 20  # bytes of a request
+MOST_STRANGERS = 32  # connections that have shown no link yet
 FORM_HEADER = "x-csrf-token"
 
 Scope = dict[str, Any]
@@ -87,11 +88,42 @@ def name_of(host: str, port: int) -> tuple[str, int] | None:
         return name.lower(), int(digits)
 
 
+class Closing(Protocol):
+    """What of a transport is needed to end its connection."""
+
+    def abort(self) -> None:
+        """End it now."""
+
+
+class Strangers:
+    """Connections that have not shown yet that a link was followed; of more than so many the oldest is ended."""
+
+    def __init__(self, most: int = MOST_STRANGERS) -> None:
+        self._most, self._held = most, dict[tuple[str, int], Closing]()
+
+    def come(self, peer: tuple[str, int] | None, transport: Closing) -> None:
+        """Somebody has connected, who has said nothing yet."""
+        if peer is None:
+            return
+        self._held[peer] = transport
+        if len(self._held) > self._most:
+            self._held.pop(next(iter(self._held))).abort()
+
+    def let_in(self, peer: tuple[str, int] | None) -> None:
+        """Who is there is known now, or has left."""
+        if peer is not None:
+            self._held.pop(peer, None)
+
+
 class Gate:
     """ASGI middleware; `rules` by the path of each route."""
 
-    def __init__(self, app: Any, routes: Sequence[BaseRoute], rules: dict[str, Rule], keys: Keys, here: Here) -> None:
+    def __init__(  # noqa: PLR0913 - a door, and all that it looks at
+        self, app: Any, routes: Sequence[BaseRoute], rules: dict[str, Rule], keys: Keys, here: Here,
+        strangers: Strangers,
+    ) -> None:  # fmt: skip
         self.app, self.routes, self.rules, self.keys, self.here = app, routes, rules, keys, here
+        self.strangers = strangers
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let in, or refuse."""
@@ -101,6 +133,8 @@ class Gate:
         headers = Headers(scope=scope)
         try:
             scope["pass"] = self._judge(scope, headers)
+            if scope["pass"] is not None:
+                self.strangers.let_in(scope["client"])
             await self.app(scope, receive, _with_headers(send))
         except Refusal as refused:
             await _refuse(scope, refused)(scope, receive, _with_headers(send))

@@ -32,6 +32,7 @@ RATE = 25  # of status [Hz]
 
 FREE = {"stop", "disable"}  # from everybody, and never counted
 ENGINEERS = {"trust", "order", "inject"}
+FILES = {"export", "import"}  # on the machine of the axis: a page has no business there
 TAKEN = ("do", "value", "speed", "as")  # of a command
 
 
@@ -119,6 +120,8 @@ class Sockets:
                 wrong = "the axis is busy with what was asked before (a stop is always taken)"
             if not wrong and not who.may(needed := self.role_for(word)):
                 wrong = f"a {who.role} may not {word}; it needs {needed}"
+            if not wrong and (word in FILES or (word == "job" and not isinstance(message.get("value"), dict))):
+                wrong = f"a page opens no file of that computer, so that {word} of one is for: detent connect"
             if word not in FREE and not commands.take():
                 wrong = f"more than {A_SECOND:g} messages a second; send fewer (a stop is always taken)"
             if wrong and not refusals.take():

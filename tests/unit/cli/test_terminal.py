@@ -1,6 +1,8 @@
 """How a command ends that is interrupted: one sentence, its status, and no file that is not whole."""
 
+import io
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -8,8 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 import detent
+from detent.cli import terminal
+from detent.kernel import cache
 
 pytestmark = pytest.mark.process
 
@@ -86,3 +91,30 @@ def test_a_signal_that_is_ignored_stays_so(tmp_path: Path) -> None:
     )
     assert python(code, tmp_path) == (0, "")
     assert (tmp_path / "told.txt").read_text() == "half"
+
+
+@pytest.mark.parametrize("looks", [True, False])
+def test_seconds_are_counted_while_it_compiles_and_only_where_somebody_looks(
+    monkeypatch: pytest.MonkeyPatch, looks: bool
+) -> None:
+    seen = io.StringIO()
+    console = Console(file=seen, force_terminal=looks, width=80)
+    monkeypatch.setattr(terminal, "make_console", lambda **_more: console)
+    monkeypatch.setattr(cache, "AT_FIRST_COMPILING", told := [terminal.say_compiling])
+    with terminal.compiling_counted(quiet=False):
+        assert len(told) == 1 + looks
+        assert told[-1] is terminal.say_compiling  # the line that says why comes first
+        cache.tell_compiling("")
+    assert told == []
+    assert ("compiling the loop 0:00:00" in plain(seen.getvalue())) is looks
+    with terminal.compiling_counted(quiet=True):
+        assert told == []
+    told.append(terminal.say_compiling)
+    with terminal.compiling_counted(quiet=False):
+        pass  # all of it was compiled before
+    assert told == [terminal.say_compiling]
+
+
+def plain(text: str) -> str:
+    """A text without the codes of a terminal."""
+    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text)

@@ -4,7 +4,9 @@ import gc
 import json
 import math
 import socket
+import threading
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.live_bench import Bench
 
+from detent.control import operation as ops
 from detent.errors import DetentError
 from detent.operate import channel as module
 from detent.operate.audit import Audit
@@ -144,3 +147,45 @@ def test_a_log_that_cannot_be_written_delays_nobody(tmp_path: Any) -> None:
     assert told["lost"] == 3
     assert "No such file" in told["trouble"]
     audit.close()
+
+
+def test_a_stop_overtakes_what_its_own_client_has_waiting_for_a_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, begun, written = Bench("cascade"), threading.Event(), threading.Event()
+    bench.pass_time(0.7)
+    session = Session(bench.host, {"name": "axis"})
+    asked = session.ask
+
+    def slowly(word: str, *more: Any, **named: Any) -> int:
+        if word == "enable":
+            begun.set()
+            written.wait(10.0)
+        return asked(word, *more, **named)
+
+    monkeypatch.setattr(session, "ask", slowly)
+    channel = Channel(session, tmp_path / "axis.sock")
+    channel.start()
+    with socket.socket(socket.AF_UNIX) as one:
+        one.settimeout(10.0)
+        one.connect(str(channel.path))
+        words = ["enable", *["confirm"] * module.MOST_BEHIND, "confirm", "stop"]
+        lines = [json.dumps({"do": word, "as": k}).encode() + b"\n" for k, word in enumerate(words)]
+        one.sendall(lines[0])
+        assert begun.wait(10.0)
+        one.sendall(b"".join(lines[1:]))
+        heard = map(json.loads, one.makefile("rb"))
+        first, second = next(heard), next(heard)
+        assert (first["as"], "wait already" in first["error"]) == (len(words) - 2, True)
+        assert (second["as"], "id" in second) == (len(words) - 1, True)  # while the first of them still waits
+        bench.pass_time(0.01)  # the loop has seen it
+        written.set()
+        marks = {told["as"]: told["id"] for told in (next(heard) for _ in range(len(words) - 2)) if "as" in told}
+        assert list(marks)[:3] == [0, 1, 2]  # the others in their order
+        for _ in range(10):
+            bench.host.run(1)
+        ended = session.ending(marks[0])
+        assert ended is not None
+        assert (ended.how, ended.code) == ("refused", ops.STALE)
+        assert bench.host.state == "switch on disabled"
+    channel.close()

@@ -1,9 +1,10 @@
 import socket
+from types import SimpleNamespace
 
 import pytest
 
 from detent.panel.__main__ import listen
-from detent.panel.gate import Here, local_names, name_of
+from detent.panel.gate import Here, Strangers, local_names, name_of
 from detent.panel.sockets import Budget
 
 
@@ -77,3 +78,17 @@ def test_a_second_address_that_this_machine_has_not_is_left_out() -> None:
         listen(["192.0.2.1", "127.0.0.1"], 0)
     for one in found:
         one.close()
+
+
+def test_of_too_many_strangers_the_oldest_is_shown_out() -> None:
+    out: list[int] = []
+    strangers = Strangers(2)
+    for k in (1, 2):
+        strangers.come(("here", k), SimpleNamespace(abort=lambda k=k: out.append(k)))
+    strangers.let_in(("here", 1))  # it has shown a link
+    strangers.come(("here", 3), SimpleNamespace(abort=lambda: out.append(3)))
+    strangers.come(None, SimpleNamespace(abort=lambda: out.append(0)))  # of a socket that has no peer
+    strangers.let_in(None)
+    assert out == []
+    strangers.come(("here", 4), SimpleNamespace(abort=lambda: out.append(4)))
+    assert out == [2]

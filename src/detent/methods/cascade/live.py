@@ -39,6 +39,7 @@ from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.run import describe_cause
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.method import Live
+from detent.methods.moves.legs import legs_of
 from detent.planning.course import Course, CourseLimits, advance, begin_at, come_to_rest, go_to, is_at_rest, run_at
 from detent.sensing.position_sensor import PositionSensor, position_of, shift_positions
 
@@ -201,7 +202,7 @@ def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Liv
 
     return Live(
         host.params, host.state, q, memory, host.tick, spec.unit("m"), spec.limits.speed,
-        {"title": "Cascade loop"}, host.feed, fault,
+        {"title": "Cascade loop"}, host.feed, fault, legs=legs_of,
         places=places(spec, host.params, host.period), limits=guard_limits(spec),
     )  # fmt: skip
 

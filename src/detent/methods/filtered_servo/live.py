@@ -36,6 +36,7 @@ from detent.methods.filtered_servo.faults import places
 from detent.methods.filtered_servo.host import FilteredHost
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.method import Live
+from detent.methods.moves.legs import legs_of
 
 FAR = 1 << 50  # pulses: where a jog goes to where nothing ends it
 COUNTERS = 220  # faults of its counters: their cause on top of it
@@ -142,7 +143,7 @@ def live(spec: FilteredServoSpec, operation: Callable[..., OperationParams]) -> 
     return {
         "": Live(
             machine.params, machine.state, q, FilteredLive(), machine.tick, speed=speed,
-            view={"title": "Filtered speed"}, fault=lambda: host.failure, places=places(spec), limits=limits,
-            fault_numbers={COUNTERS + DEVIATION_RANGE: FOLLOWING, COUNTERS + SPEED_RANGE: OVERSPEED},
+            view={"title": "Filtered speed"}, fault=lambda: host.failure, legs=legs_of, places=places(spec),
+            limits=limits, fault_numbers={COUNTERS + DEVIATION_RANGE: FOLLOWING, COUNTERS + SPEED_RANGE: OVERSPEED},
         )
     }  # fmt: skip

@@ -12,6 +12,7 @@ from detent.kernel.loop import serves
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import step
 from detent.methods.method import Live
+from detent.methods.moves.legs import legs_of
 from detent.methods.phase_servo.controller import PhaseController, PhaseControllerParams, PhaseLines, acquire, command
 from detent.methods.phase_servo.faults import places
 from detent.methods.phase_servo.host import PhaseHost
@@ -132,6 +133,6 @@ def live(spec: PhaseServoSpec, operation: Callable[..., OperationParams]) -> dic
         "": Live(
             machine.params, machine.state, q, memory, machine.tick, speed=spec.limits.speed,
             view={"title": "Phase", "data": {"cycle": int(cycle)}}, fault=lambda: host.failure,
-            places=places(spec, spec.tick), limits={STUCK: spec.protection.stuck_effort, SATURATED: 1.0},
+            legs=legs_of, places=places(spec, spec.tick), limits={STUCK: spec.protection.stuck_effort, SATURATED: 1.0},
         )
     }  # fmt: skip

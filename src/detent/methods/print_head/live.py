@@ -18,7 +18,6 @@ from detent.control.head_computer import (
     FAULT,
     IMPLAUSIBLE,
     NO_OPERATION,
-    NOT_CALIBRATED,
     OBSTRUCTION,
     OK,
     HeadComputer,
@@ -54,6 +53,7 @@ from detent.methods.method import Live
 from detent.methods.print_head.controller import PrintHeadController, PrintHeadLines
 from detent.methods.print_head.faults import places
 from detent.methods.print_head.line_plan import RESERVE
+from detent.methods.print_head.print_job import parse_text
 from detent.methods.print_head.printed_page import PrintJob
 from detent.methods.print_head.run import NOT_FIRED, Printing, PrintRun, inked, line_commands, print_head_machine
 from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
@@ -268,10 +268,10 @@ def begin_piece(c: HeadComputer, memory: HeadLive) -> None:
 
 @step
 def go_on_printing(c: HeadComputer, memory: HeadLive, o: Operation) -> None:
-    """The next line as soon as that before the last one is printed; the end of the job."""
+    """The next line as soon as that before the last one is printed, unless a pause holds it; the end of the job."""
     if memory.done == o.demand.number:
         memory.job = 0
-    elif memory.begun < min(o.demand.laid, o.demand.number) and is_sent(memory):
+    elif o.paused == 0 and memory.begun < min(o.demand.laid, o.demand.number) and is_sent(memory):
         before = PRINTED + memory.begun - 1  # the line that may still be printed, or wait
         if memory.waiting == 0 or memory.answers[0] == before:
             begin_piece(c, memory)
@@ -412,8 +412,9 @@ class HeadWork:
         params: Any = live.params
         state: Any = live.state
         if not state.controller.head.homed:
-            raise AxisError(describe_sb1(NOT_CALIBRATED))
+            raise AxisError("the head has not measured itself yet; wait until it rests, or home it")
         self.memory: Any = live.memory
+        self.name = job.name
         self.printing = Printing(spec, job, params, state)
         self.printing.plan()
         self.printing.landed[:] = NOT_FIRED
@@ -423,6 +424,11 @@ class HeadWork:
     def pieces(self) -> int:
         """Lines of the job."""
         return len(self.printing.plans)
+
+    @property
+    def done(self) -> int:
+        """Lines that are printed."""
+        return min(int(self.memory.done), self._laid)
 
     def piece(self) -> bytes | None:
         """The next line, once its bank of the line buffer and its place in the tray are free."""
@@ -475,6 +481,6 @@ def live(spec: PrintHeadSpec, operation: Callable[..., OperationParams]) -> dict
 
     made.append(Live(
         machine.params, machine.state, q, memory, machine.tick, speed=spec.limits.speed, view={"title": "Print line"},
-        fault=fault, tray=tray, work=work, places=places(), fault_numbers={OBSTRUCTED: SATURATED},
+        fault=fault, tray=tray, work=work, text=parse_text, places=places(), fault_numbers={OBSTRUCTED: SATURATED},
     ))  # fmt: skip
     return {"": made[0]}

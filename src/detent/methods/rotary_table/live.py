@@ -1,6 +1,7 @@
 """The rotary table under somebody's hand: its buttons and dial, its position numbers; it turns for ever."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from detent.control.guard import FOLLOWING, JUMPED, NO_ARRIVAL, OVERSPEED, SATURATED, STUCK, enable_guard
@@ -23,15 +24,17 @@ from detent.control.operation import (
 from detent.control.reaction import SOFT
 from detent.control.table_positioner import HOLD as STANDS
 from detent.control.table_positioner import MOVE, SHORTEST, STOPPING, braking_path, set_out
+from detent.errors import DetentError
 from detent.kernel.loop import serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
-from detent.methods.method import Live
+from detent.methods.method import Leg, Live
 from detent.methods.rotary_table.build import GUARD_PERIOD
 from detent.methods.rotary_table.controller import TableController, TableControllerParams, TableLines
 from detent.methods.rotary_table.faults import places
 from detent.methods.rotary_table.host import TableHost
 from detent.methods.rotary_table.schema import RotaryTableSpec
+from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Wait
 
 BUSY = 201  # reason to refuse, `errors.REFUSAL_TEXT`
 
@@ -120,6 +123,25 @@ def serve(  # noqa: PLR0913 - as all of its kind
         a.fault = c.guard.hard if lines.enable == 0 else 0
 
 
+def sequence_legs(speed: float, job: SequenceJob) -> list[Leg]:
+    """The steps of a sequence, repeats written out; live there are no signals, so that none may be asked for."""
+    legs: list[Leg] = []
+    for _, one in job.actions():
+        if isinstance(one, Go):
+            legs.append(Leg(GO, one.number))
+        elif isinstance(one, Jog) and one.duration is not None:
+            legs.append(Leg(JOG, one.direction * (one.speed or speed), one.speed, one.duration))
+        elif isinstance(one, Wait) and one.duration is not None:
+            legs.append(Leg(0, seconds=one.duration))
+        else:
+            got = f"{job.name}, line {one.row}: got the signal {one.signal!r}"
+            raise DetentError(
+                f"{got}; expected, live: go, wait and jog for a time, for there are no signals; leave it out, or "
+                "simulate it with: detent run"
+            )
+    return legs
+
+
 def live(spec: RotaryTableSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:
     """The table at power-on, to be operated."""
     host = TableHost(spec)
@@ -135,7 +157,8 @@ def live(spec: RotaryTableSpec, operation: Callable[..., OperationParams]) -> di
               OVERSPEED: table.overspeed * speed, JUMPED: table.jump * speed * GUARD_PERIOD}  # fmt: skip
     made = Live(
         machine.params, machine.state, q, TableLive(), machine.tick, "rad", speed, {"title": "Dial"},
-        fault=lambda: host.failure, numbers=frozenset(map(int, spec.position)), places=places(spec, strobe),
+        fault=lambda: host.failure, legs=partial(sequence_legs, speed), numbers=frozenset(map(int, spec.position)),
+        places=places(spec, strobe),
         limits=limits,
     )  # fmt: skip
     return {"": made}

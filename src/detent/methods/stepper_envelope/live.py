@@ -7,6 +7,7 @@ look, between two steps, and so no step finds half of an edit and a session repe
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from detent.control.guard import FOLLOWING
 from detent.control.guard import TRAVEL as END_OF_TRAVEL
@@ -32,7 +33,7 @@ from detent.errors import STEP_FAULT_TEXT, DetentError
 from detent.kernel.loop import serves
 from detent.kernel.registers import Registers, block, f8, i4, i8, register, u1
 from detent.kernel.step import step
-from detent.methods.method import Live
+from detent.methods.method import Leg, Live
 from detent.methods.stepper_envelope.build import instant
 from detent.methods.stepper_envelope.controller import (
     Entries,
@@ -43,6 +44,7 @@ from detent.methods.stepper_envelope.controller import (
 from detent.methods.stepper_envelope.faults import places
 from detent.methods.stepper_envelope.host import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.methods.stepper_envelope.stage_job import StageJob, StageJog
 from detent.planning.step_envelope import INDEX_BITS, StepEnvelope
 
 LOOK = 1e-3  # time between two looks [s]
@@ -263,9 +265,37 @@ def live_motor(spec: StepperEnvelopeSpec, name: str, operation: Callable[..., Op
         view={"title": "Envelope", "data": data},
         feed=motor.feed,
         fault=fault,
+        legs=partial(stage_legs, name),
         places=places(tick),
         fault_numbers=numbers,
     )
+
+
+def stage_legs(motor: str, job: StageJob) -> list[Leg]:
+    """The moves of a stage that are this motor's; of no other one, for each motor is live by itself."""
+    others = [name for name in job.motors if name != motor]
+    if others:
+        got = f"{job.name}: got moves of {', '.join(others)}"
+        raise DetentError(f"{got}; expected, live: of motor {motor} alone, which this is; leave the others out")
+    legs: list[Leg] = []
+    kind, place = MOVE_BY, 0.0
+    for move in job.moves:
+        if isinstance(move, StageJog):
+            legs += [Leg(JOG, move.speed, None, move.duration), Leg(0, seconds=move.dwell)]
+            kind, place = MOVE_BY, math.nan
+            continue
+        if move.turn is not None or move.change is not None:
+            got = f"{job.name}, move {move.number}: got a turn or a stop that is changed on the way"
+            raise DetentError(f"{got}; expected, live: plain moves; move the ends by hand, or simulate it: detent run")
+        if motor in move.targets:
+            kind, place = MOVE_TO, move.targets[motor]
+        else:
+            place += move.by[motor]
+        if math.isnan(place):
+            got = f"{job.name}, move {move.number}: got a way from where a jog has ended"
+            raise DetentError(f"{got}; expected, live: a place after a jog; name one")
+        legs.append(Leg(kind, place, None, move.dwell))
+    return legs
 
 
 def live(spec: StepperEnvelopeSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:

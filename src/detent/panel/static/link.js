@@ -1,6 +1,7 @@
 // The way to the axis: one WebSocket, answers by mark, endings by id, rows of the scope in binary.
 
 const RETRY = 500; // ms until the next attempt
+const KEEP_JOB = 500; // ms between two keep-alives of a job, which lives for 2 s without one
 const PATIENCE = 5000; // ms until a command without an answer counts as lost
 export const STALE = 500; // ms after which what is shown is no longer current
 
@@ -27,6 +28,7 @@ export class Link extends EventTarget {
     this.now = null; // the last message of status
     this.heard = -Infinity; // when
     this.isOpen = false;
+    this.kept = 0; // when a job of this page was kept last
     this.marks = 0;
     this.waiting = new Map(); // mark: what to do with the answer
     this.running = new Map(); // id: what to do with the ending
@@ -86,6 +88,10 @@ export class Link extends EventTarget {
 
   accept(message) {
     this.now = message;
+    if (message.status.job && message.holder === message.you && this.heard - this.kept > KEEP_JOB) {
+      this.kept = this.heard; // with what it hears, for timers of a hidden page come late
+      this.send({ do: "keep" });
+    }
     if (!this.isOpen) {
       this.isOpen = true;
       this.trouble = "";

@@ -76,7 +76,7 @@ def test_what_went_wrong_is_told_with_its_line(axis):
 
 def test_without_frames_there_is_nothing_to_plan_in(axis):
     axis.state.controller.head.homed = 0
-    with pytest.raises(AxisError, match="not calibrated"):
+    with pytest.raises(AxisError, match="not measured itself"):
         HeadWork(make_spec(), axis, parse_text("detent"))
 
 
@@ -147,7 +147,7 @@ def test_a_job_that_is_stopped_ends_there_and_another_one_prints_whole():
 @pytest.mark.compiled
 def test_a_job_waits_for_the_frames_and_for_the_first_motion_to_be_confirmed():
     job, axis = load_job(EXAMPLES / "letter.txt"), Head(enable=False)
-    with pytest.raises(AxisError, match="not calibrated"):
+    with pytest.raises(AxisError, match="not measured itself"):
         axis.host.work(job)
     axis.host.ask(ops.ENABLE)
     axis.until_rest()
