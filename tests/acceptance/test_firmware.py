@@ -83,7 +83,7 @@ def test_02_03_04_the_cascade_is_equal_on_each_processor(exported, target):
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("method", JOBS)
+@pytest.mark.parametrize("method", [pytest.param("cascade", marks=pytest.mark.long), *list(JOBS)[1:]])
 def test_02_03_04_each_is_equal_on_each_processor(exported, method):
     proven(exported(method, LONG), *EMULATED)
 
