@@ -59,7 +59,7 @@ class CascadeLawParams(Registers):
     """Constants of the law; its command is in volts, or in whatever the amplifier takes."""
 
     period: f8 = register("time between two samples", unit="s")
-    position_pid: u1 = register("0 cascade, 1 position PID")
+    position_pid: u1 = register("0 cascade, 1 position PID", option=True)
     cascade: VelocityLoopParams = block("position P over velocity P or PI")
     pid: PidParams = block("position PID")
     feed_forward: FeedForwardParams = block("feedforward")

@@ -14,7 +14,7 @@ class DeviationParams(Registers):
     gain: f8 = register("K1: drive counts per pulse of deviation", unit="count/count")
     range: i4 = register("largest magnitude of the deviation", unit="count")
     word_limit: f8 = register("largest magnitude of the drive word", unit="count")
-    whole_words: u1 = register("1 rounds the drive word to whole counts")
+    whole_words: u1 = register("1 rounds the drive word to whole counts", option=True)
 
 
 class Deviation(Registers):

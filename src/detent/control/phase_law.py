@@ -16,8 +16,8 @@ class LawParams(Registers):
     position_k3: i4 = register("KP3: of the sum in position mode")
     dead_band: i4 = register("half width D of the dead band at stop", unit="count")
     integral_limit: i4 = register("largest magnitude of the integral", unit="count")
-    corrector: u1 = register("1: corrector in use")
-    integrator: u1 = register("1: integrator in use")
+    corrector: u1 = register("1: corrector in use", option=True)
+    integrator: u1 = register("1: integrator in use", option=True)
     word_limit: i8 = register("half the range of the drive word, 2^(M-1)", unit="count")
 
 

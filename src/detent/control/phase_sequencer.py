@@ -17,12 +17,14 @@ class SequencerParams(Registers):
     """Table, threshold and times."""
 
     threshold: i8 = register("distance at which the mode changes", unit="count")
-    last: i8 = register("last entry of the table in use", unit="count")
+    last: i8 = register("last entry of the table in use", unit="count", range=(0, TABLE - 1))
     table: i2_array = register("reference velocity against distance [pulses per sample]", unit="count", length=TABLE)
     ready_ticks: i8 = register("one-shot 108: from position mode to ready", unit="tick")
     stop_ticks: i8 = register("one-shot 109: from position mode to stop", unit="tick")
     quiet_ticks: i8 = register("silence of the tracker that ends the acquisition", unit="tick")
-    incremental: u1 = register("1: final approach by counted pulses, the servo the method is compared with")
+    incremental: u1 = register(
+        "1: final approach by counted pulses, the servo the method is compared with", option=True
+    )
 
 
 class Sequencer(Registers):

@@ -8,13 +8,9 @@ The literal rule of the claim sets the frequency of the entry, whatever the pres
 only, that is for runs that begin at a start extreme.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
+from detent.kernel.loop import i2_signal
 from detent.kernel.registers import Registers, i1, i2, i4, i4_array, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
-
-Entries = NDArray[np.int16]
 
 REST, ACCEL, CRUISE, DECEL, TURN, FAULT = 0, 1, 2, 3, 4, 5  # states of specification 4
 IDLE, STEP, PAUSE = 0, 1, 2  # what comes next: nothing, a step with the frequency of `word`, the wait of a reversal
@@ -30,10 +26,10 @@ class StepRuleParams(Registers):
 
     ramp: i4_array = register("word of each ramp index: frequency [Hz] or period [tick]", unit="count", length=RAMP)
     limit: i4_array = register("word of each zone limit: frequency [Hz] or period [tick]", unit="count", length=LIMITS)
-    index_mask: i4 = register("bits of an entry that hold the ramp index", unit="code")
-    zone_shift: u1 = register("place of the zone number in an entry", unit="bit")
-    reload: u1 = register("1: words are periods, a larger one is slower")
-    literal: u1 = register("1: the literal rule of the claim, without a limit on the change")
+    index_mask: i4 = register("bits of an entry that hold the ramp index", unit="code", range=(0, RAMP - 1))
+    zone_shift: u1 = register("place of the zone number in an entry", unit="bit", range=(11, 15))
+    reload: u1 = register("1: words are periods, a larger one is slower", option=True)
+    literal: u1 = register("1: the literal rule of the claim, without a limit on the change", option=True)
 
 
 class StepRule(Registers):
@@ -50,7 +46,7 @@ class StepRule(Registers):
     active: u1 = register("1 during an automatic move")
     state: u1 = register("0 rest, 1 accelerate, 2 cruise, 3 decelerate, 4 turn, 5 fault", unit="code")
     cause: u1 = register("of the last fault: 1 the envelope fell too fast, 2 position out of range", unit="code")
-    index: i2 = register("ramp index of the running step, -1 at rest", unit="count")
+    index: i2 = register("ramp index of the running step, -1 at rest", unit="count", range=(-1, RAMP - 1))
     word: i4 = register("frequency [Hz] or period [tick] of the running step, 0 at rest", unit="count")
     relation: i1 = register("last comparison of present and permissible: -1 less, 0 equal, 1 greater")
     direction: i1 = register("direction line: 1 or -1")
@@ -163,9 +159,9 @@ def come_to_rest(r: StepRule, permissible: int, moved: bool) -> int:
 
 
 @hot_step
-def next_entry(r: StepRule, up: Entries, down: Entries) -> int:
+def next_entry(r: StepRule, up: i2_signal, down: i2_signal) -> int:
     """Entry of the next step, read while the present one runs; no other step of the rule takes the tables."""
-    if not 0 <= r.position < len(up):
+    if not (0 <= r.position < len(up) and r.position < len(down)):
         return OUTSIDE
     direction = r.heading if r.index < 0 else r.direction
     return int(up[r.position]) if direction > 0 else int(down[r.position])

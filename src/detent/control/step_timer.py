@@ -10,7 +10,7 @@ class StepTimerParams(Registers):
     """Clock of the timer and what its word means."""
 
     clock_hz: i8 = register("ticks of the timer per second", unit="Hz")
-    reload: u1 = register("1: a word is the period itself [tick]; 0: it is a frequency [Hz]")
+    reload: u1 = register("1: a word is the period itself [tick]; 0: it is a frequency [Hz]", option=True)
 
 
 class StepTimer(Registers):

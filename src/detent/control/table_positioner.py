@@ -30,7 +30,7 @@ class EndlessAngleParams(Registers):
     """
 
     period: i8 = register("range of the detected angle T", unit="count")
-    form: u1 = register("0 turn counter, 1 flag as in the patent, 2 raw: no extension", unit="code")
+    form: u1 = register("0 turn counter, 1 flag as in the patent, 2 raw: no extension", unit="code", option=True)
 
 
 class EndlessAngle(Registers):
@@ -51,7 +51,7 @@ class InterpolatorParams(Registers):
     Remaining angle, speed and acceleration have f fraction bits: at a slow jog an interrupt moves less than a count.
     """
 
-    fraction: i8 = register("fraction bits f of remaining angle, speed and acceleration, at most 16", unit="count")
+    fraction: i8 = register("fraction bits f of remaining angle, speed and acceleration", unit="count", range=(0, 16))
     acceleration: i8 = register("change of speed per interrupt, above 0", unit="count/2^f")
     max_speed: i8 = register("largest speed, whatever dial or table say", unit="count/2^f")
 
@@ -66,7 +66,7 @@ class Interpolator(Registers):
 class PositionTable(Registers):
     """PDT (3.6): angle, speed and way per position number, written by operator or program."""
 
-    entries: i8 = register("position numbers in use, from 0", unit="count")
+    entries: i8 = register("position numbers in use, from 0", unit="count", range=(0, POSITIONS))
     angle: i8_array = register("angle", unit="count", length=POSITIONS)
     speed: i8_array = register(
         "speed per interrupt; 0 where there is no such position", unit="count/2^f", length=POSITIONS
@@ -88,13 +88,14 @@ class PositionerParams(Registers):
     max_word: i8 = register("largest magnitude of the word: 2047 with 12 bits", unit="count")
     window: i8 = register("deviation that counts as in position", unit="count")
     window_interrupts: i8 = register("interrupts inside it until the axis says so", unit="count")
-    judge: u1 = register("remaining angle of step 116: 0 theoretical IR, 1 actual AR", unit="code")
-    inclusive: u1 = register("1: the judge fires at T or less, 0: below T")
-    guarded: u1 = register("1: it fires only with FLG on; the turn counter does not need that")
-    update: u1 = register("118 and 120: 0 indivisible, 1 flag first, 2 remaining first", unit="code")
-    unsigned_remaining: u1 = register("1: AR = |M - R| as in the flowchart, 0: signed along Z")
+    judge: u1 = register("remaining angle of step 116: 0 theoretical IR, 1 actual AR", unit="code", option=True)
+    inclusive: u1 = register("1: the judge fires at T or less, 0: below T", option=True)
+    guarded: u1 = register("1: it fires only with FLG on; the turn counter does not need that", option=True)
+    update: u1 = register("118 and 120: 0 indivisible, 1 flag first, 2 remaining first", unit="code", option=True)
+    unsigned_remaining: u1 = register("1: AR = |M - R| as in the flowchart, 0: signed along Z", option=True)
     open_loop: u1 = register(
-        "1: S4 is the interpolated speed, without position control; what the method is compared with"
+        "1: S4 is the interpolated speed, without position control; what the method is compared with",
+        option=True,
     )
 
 

@@ -13,7 +13,7 @@ exponential in pairs.
 from math import floor, inf, sqrt
 
 from detent.kernel.compiled import power_of_two
-from detent.kernel.step import step
+from detent.kernel.step import bounded, step
 
 LOG2_E = 1.44269504088896338700
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
@@ -95,6 +95,7 @@ def cosine_part(x: float, low: float) -> float:
 
 
 @step
+@bounded(1022, "from a turn to the largest float, by twos")
 def less_whole_turns(x: float) -> float:
     """What is left of a large angle without whole turns, exactly."""
     turn = FULL_TURN

@@ -6,16 +6,17 @@ never be found in the compiled cache. In the same way a controller states by `co
 `replay` runs it alone, on wires that were recorded.
 """
 
+import ctypes
 from collections.abc import Callable
 from operator import attrgetter
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numba.extending
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.kernel.compiled import byte_at, copy_back, local_copy, put_byte
-from detent.kernel.registers import Registers
+from detent.kernel.registers import Registers, Width
 from detent.kernel.step import hot_step, step
 
 Bytes = NDArray[np.uint8]
@@ -24,6 +25,8 @@ F = TypeVar("F", bound=Callable[..., object])
 
 extending: Any = numba.extending  # it publishes no types
 HostArray = Any  # a ctypes array; compiled code reads ``array[k]`` and ``len(array)``
+f8_signal = Annotated[Any, Width("f8", ctypes.c_double, "double")]  # one of float64, as a controller's step takes it
+i2_signal = Annotated[Any, Width("i2", ctypes.c_int16, "int16_t")]
 _TICKS: dict[type[Registers], tuple[Callable[..., Any], str]] = {}
 
 _SERVES: dict[type[Registers], Callable[..., Any]] = {}
@@ -60,6 +63,11 @@ def controls(params: type[Registers]) -> Callable[[F], F]:
         return function
 
     return register
+
+
+def control_of(params: type[Registers]) -> Callable[..., Any]:
+    """What a controller with these parameters does in a tick, as it was stated by `controls`."""
+    return _CONTROLS[params]
 
 
 def disturbs(params: type[Registers]) -> Callable[[F], F]:

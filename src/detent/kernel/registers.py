@@ -8,6 +8,7 @@ one declaration, and numpy takes the class for a dtype.
 
 import ctypes
 import inspect
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Self, get_args
@@ -66,6 +67,8 @@ class Field:
     unit: str = ""
     length: int = 0  # number of elements of an array; 0 for a single value
     by: str = ""  # who writes a wire between controller and plant; empty elsewhere
+    range: tuple[float, float] | None = None  # least and largest value that is ever stored, where one is claimed
+    option: bool = False  # of parameters: it chooses a variant, and is a constant of the firmware
     name: str = ""
     offset: int = 0  # bytes from the start of the structure
     width: Width | None = None  # None for a nested block
@@ -89,9 +92,21 @@ class Leaf:
 PLANT, CONTROLLER = "plant", "controller"
 
 
-def register(doc: str, *, unit: str = "", length: int = 0, by: str = "") -> Any:
-    """Declare a register; a wire says by whom it is written, `PLANT` or `CONTROLLER`."""
-    return Field(doc, unit, length, by)
+def register(  # noqa: PLR0913 - all that can be said of one
+    doc: str,
+    *,
+    unit: str = "",
+    length: int = 0,
+    by: str = "",
+    range: tuple[float, float] | None = None,  # noqa: A002 - the word for it
+    option: bool = False,
+) -> Any:
+    """Declare a register; a wire says by whom it is written, `PLANT` or `CONTROLLER`.
+
+    `range` claims something of every value ever stored, and changes neither width nor layout; with
+    ``DETENT_CHECK_RANGES=1`` plain steps raise on a store outside.
+    """
+    return Field(doc, unit, length, by, range, option)
 
 
 def block(doc: str, *, by: str = "") -> Any:
@@ -134,6 +149,22 @@ class _RegistersMeta(type_of_structure):  # pyright: ignore[reportGeneralTypeIss
             )
             for key, (ctype, width) in stored.items()
         }
+        if os.environ.get("DETENT_CHECK_RANGES") == "1":
+            structure.__setattr__ = _set_checked
+
+
+def _set_checked(registers: "Registers", name: str, value: Any) -> None:
+    """Store, unless what then stands there is outside the range that the declaration claims."""
+    field = registers.__fields__.get(name)
+    ctypes.Structure.__setattr__(registers, name, value)
+    if field is not None and field.range is not None and not field.length:
+        lowest, highest = field.range
+        stored = getattr(registers, name)
+        if not lowest <= stored <= highest:
+            raise ValueError(
+                f"register {type(registers).__name__}.{name}: got {stored!r}; expected: {lowest!r} to {highest!r}, as "
+                "it is declared; correct the step, or the range of the declaration"
+            )
 
 
 class Registers(ctypes.Structure, metaclass=_RegistersMeta):

@@ -80,6 +80,17 @@ def hot_step(function: F) -> F:
     return _compiled(function, forceinline=True)
 
 
+def bounded(turns: int, why: str) -> Callable[[F], F]:
+    """State how often each ``while`` of a step turns at most, and why: firmware has no loop without a bound."""
+
+    def note(function: F) -> F:
+        """Keep it with the function."""
+        function.__bounded__ = (turns, why)  # pyright: ignore[reportFunctionMemberAccess]
+        return function
+
+    return note
+
+
 def _compiled(function: F, *, forceinline: bool) -> F:
     # No step is called by address, so none needs the wrapper for it: a sixth less to compile.
     made: Any = numba.njit(error_model="numpy", nogil=True, forceinline=forceinline, no_cfunc_wrapper=True)(function)

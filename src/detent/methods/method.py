@@ -253,6 +253,8 @@ class Method(Protocol[SpecT]):
     machines: ClassVar[str] = ""
     """Place of the other half, the drive's amplifier and what it moves: ``machine(spec)`` gives a `Plant` and the same
     `Wiring`, by the name of each motor."""
+    actions: ClassVar[tuple[str, ...]] = ()
+    """Steps of its `controller` that firmware has beside a tick of it, the first puts it on; none where it has none."""
     linear_loops: ClassVar[str] = ""
     """Place of its loops as linear systems, by where they are cut open: ``loops(spec)``; none where none is linear."""
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences

@@ -1,25 +1,47 @@
 """An axis in simulated time: parameters, state, recorder, and the passing of time."""
 
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from detent.kernel.loop import advance
+from detent.kernel.loop import Bytes, Offsets, advance
 from detent.kernel.registers import Registers
 from detent.record.capture import Capture
 from detent.record.recorder import Recorder
 
 LONGEST_STRETCH = 1 << 20  # ticks of one call into compiled code: progress can be shown between two
-AnyRecorder = Recorder | Capture  # what records a run: every n-th tick of all of it, or each clock of a stretch
 Progress = Callable[[float, str], None]  # called with the share done, 0..1, and what is being done
 P = TypeVar("P", bound=Registers)
 S = TypeVar("S", bound=Registers)
 
 
+AnyRecorder = Recorder | Capture  # what records a run: every n-th tick of all of it, or each clock of a stretch
+
+
+class Witness(Protocol):
+    """Sees every tick of a run, and what its host writes between two stretches of them."""
+
+    rows: Bytes  # a row per tick, by its number modulo their count
+    picks: Offsets
+
+    def room(self) -> int:
+        """Ticks of the next stretch at most."""
+        ...
+
+    def begin(self, params: Any, state: Any, feed: tuple[Any, ...]) -> None:
+        """A stretch begins; the host has written what it wants."""
+        ...
+
+    def take(self, ticks: int) -> None:
+        """So many ticks have passed."""
+        ...
+
+
 class Machine(Generic[P, S]):
     """A simulated axis whose base tick lasts `tick` [s].
 
+    What the host has laid ready for a stretch is ``feed()``.
     ``advance(params, state, ticks, trace, picks, every)`` gives the ticks run: fewer when the axis waits for its host;
     ``by_clocks(params, state, ticks, trace, picks)`` is the same, recording every clock inside a tick.
     """
@@ -29,13 +51,14 @@ class Machine(Generic[P, S]):
         params: P,
         state: S,
         tick: float,
-        recorder: AnyRecorder | None = None,
+        recorder: AnyRecorder | Witness | None = None,
         *,
         advance: Callable[..., int] = advance,
         by_clocks: Callable[..., int] | None = None,
+        feed: Callable[[], tuple[Any, ...]] = tuple,
     ) -> None:
         self.params, self.state, self.tick, self.recorder = params, state, tick, recorder
-        self._advance, self._by_clocks = advance, by_clocks
+        self._advance, self._by_clocks, self._feed = advance, by_clocks, feed
         self._clock: Any = state  # every axis's state has a field `tick`, which the base class cannot name
         self._no_rows = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))
 
@@ -63,6 +86,11 @@ class Machine(Generic[P, S]):
         r, now = self.recorder, self._clock.tick
         if r is None:
             return self._advance(self.params, self.state, ticks, *self._no_rows, 0)
+        if not isinstance(r, Recorder | Capture):
+            r.begin(self.params, self.state, self._feed())
+            done = self._advance(self.params, self.state, min(ticks, r.room()), r.rows, r.picks, 1)
+            r.take(done)
+            return done
         ticks = min(ticks, r.room(now))
         if isinstance(r, Capture) and r.fine and self._by_clocks is not None:
             done = self._by_clocks(self.params, self.state, ticks, r.rows, r.picks)
@@ -74,5 +102,5 @@ class Machine(Generic[P, S]):
 
     def close(self) -> None:
         """Hand the last rows to the recorder's sink."""
-        if self.recorder is not None:
+        if isinstance(self.recorder, Recorder | Capture):
             self.recorder.flush(self._clock.tick)

@@ -40,11 +40,11 @@ NONE, FLOAT, FIXED = 0, 1, 2
 class SpeedFilterParams(Registers):
     """Scale, coefficient and arithmetic of the filter."""
 
-    kind: u1 = register("0 no filter, 1 floating point, 2 fixed point", unit="code")
+    kind: u1 = register("0 no filter, 1 floating point, 2 fixed point", unit="code", option=True)
     scale: i4 = register("B: multiplier of the count, before the filter")
     coefficient: f8 = register("A: share of the new value, above 0 and at most 1")
-    shift: u1 = register("fixed point: the filter takes 2^-shift of a new sample, A", unit="bit")
-    fraction_bits: u1 = register("fixed point: bits after the point", unit="bit")
+    shift: u1 = register("fixed point: the filter takes 2^-shift of a new sample, A", unit="bit", range=(0, 31))
+    fraction_bits: u1 = register("fixed point: bits after the point", unit="bit", range=(0, 31))
 
 
 class SpeedFilter(Registers):

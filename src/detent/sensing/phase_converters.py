@@ -16,8 +16,8 @@ from detent.kernel.step import hot_step, step
 class CarrierParams(Registers):
     """Length of the carrier cycle."""
 
-    mask: i8 = register("counts per cycle N, less one", unit="count")
-    shift: i8 = register("log2 N - 3: the counter's bits below the three that are decoded", unit="count")
+    mask: i8 = register("counts per cycle N, less one", unit="count", range=(0, 0xFFFF))
+    shift: i8 = register("log2 N - 3: the counter's bits below the three that are decoded", unit="count", range=(0, 13))
 
 
 class Carrier(Registers):
@@ -62,9 +62,11 @@ def reset_carrier(r: Carrier) -> None:
 class TrackingParams(Registers):
     """Length of the reference counter and the repair of its false lock."""
 
-    mask: i8 = register("counts per cycle N, less one", unit="count")
-    top: i8 = register("number of the counter's top bit", unit="count")
-    leave_antiphase: u1 = register("1 takes a falling edge of PS at the gate for a lead: no false lock at antiphase")
+    mask: i8 = register("counts per cycle N, less one", unit="count", range=(0, 0xFFFF))
+    top: i8 = register("number of the counter's top bit", unit="count", range=(0, 15))
+    leave_antiphase: u1 = register(
+        "1 takes a falling edge of PS at the gate for a lead: no false lock at antiphase", option=True
+    )
 
 
 class TrackingConverter(Registers):
@@ -111,8 +113,8 @@ def shift_samples(p: TrackingParams, r: TrackingConverter, ps: int) -> None:
 class AbsoluteParams(Registers):
     """Length of the free counter."""
 
-    mask: i8 = register("counts per cycle N, less one", unit="count")
-    top: i8 = register("number of the counter's top bit", unit="count")
+    mask: i8 = register("counts per cycle N, less one", unit="count", range=(0, 0xFFFF))
+    top: i8 = register("number of the counter's top bit", unit="count", range=(0, 15))
 
 
 class AbsoluteConverter(Registers):

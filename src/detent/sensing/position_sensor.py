@@ -24,8 +24,8 @@ class PositionSensorParams(Registers):
 
     period: f8 = register("time between two samples", unit="s")
     resolution: f8 = register("travel per count; 0: the encoder is an ideal one", unit="m")
-    delay: i8 = register("samples until a position is read", unit="count")
-    span: i8 = register("number of samples of the velocity difference, 1 or more", unit="count")
+    delay: i8 = register("samples until a position is read", unit="count", range=(0, MEMORY - 1))
+    span: i8 = register("number of samples of the velocity difference, 1 or more", unit="count", range=(0, MEMORY - 1))
     smoothing: f8 = register("part of a new velocity that is taken over at a sample; 1: no filter", unit="1")
 
 
@@ -35,7 +35,7 @@ class PositionSensor(Registers):
     zero: f8 = register("position of count 0", unit="m")
     position: f8 = register("position read", unit="m")
     velocity: f8 = register("velocity of the positions read", unit="m/s")
-    place: i8 = register("place of the last sample in the memory", unit="count")
+    place: i8 = register("place of the last sample in the memory", unit="count", range=(0, MEMORY - 1))
     memory: f8_array = register("last positions", unit="m", length=MEMORY)
 
 
@@ -64,8 +64,10 @@ def read_word(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) -> 
     r.velocity += p.smoothing * ((r.position - before) / (p.span * p.period) - r.velocity)
 
 
+@step
 def stand_sensor(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) -> None:
     """As if the encoder had shown this word for long."""
     r.position = position_of(p, r, word)
     r.velocity = 0.0
-    r.memory[:] = [r.position] * MEMORY
+    for k in range(MEMORY):
+        r.memory[k] = r.position

@@ -50,7 +50,9 @@ class CompositionParams(Registers):
     coarse: i8 = register("coarse counts per table turn", unit="count")
     fine_zero: i8 = register("fine word at table angle 0", unit="count")
     coarse_zero: i8 = register("coarse word at table angle 0", unit="count")
-    truncating: u1 = register("1: motor turns from the coarse word alone, the way the method is compared with")
+    truncating: u1 = register(
+        "1: motor turns from the coarse word alone, the way the method is compared with", option=True
+    )
 
 
 class AbsoluteAngle(Registers):

@@ -9,11 +9,11 @@ from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeRefe
 from detent.control.cascade_law import control as control_law
 from detent.control.guard import Guard, GuardParams, is_overdue, lasting, watch, watch_number, weigh_effort
 from detent.control.supervision import Supervision, SupervisionParams, supervise, warm_up
-from detent.kernel.loop import HostArray, controls
+from detent.kernel.loop import HostArray, controls, f8_signal
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.sensing.home_marks import EndWires, HomeWires
-from detent.sensing.position_sensor import EncoderWord, PositionSensor, PositionSensorParams, read_word
+from detent.sensing.position_sensor import EncoderWord, PositionSensor, PositionSensorParams, read_word, stand_sensor
 
 ARRIVED, FAULT = 1, 2  # events
 
@@ -24,8 +24,8 @@ Feed = tuple[HostArray, HostArray, HostArray, HostArray]
 class FeedbackParams(Registers):
     """Which encoder the loops use."""
 
-    position_on_load: u1 = register("position loop: 0 encoder of the motor, 1 of the load")
-    velocity_on_load: u1 = register("velocity loop: 0 encoder of the motor, 1 of the load")
+    position_on_load: u1 = register("position loop: 0 encoder of the motor, 1 of the load", option=True)
+    velocity_on_load: u1 = register("velocity loop: 0 encoder of the motor, 1 of the load", option=True)
 
 
 class LimitParams(Registers):
@@ -34,7 +34,7 @@ class LimitParams(Registers):
     following_error: f8 = register("largest magnitude of the position error", unit="m")
     lowest: f8 = register("lower end of the travel, with the window", unit="m")
     highest: f8 = register("upper end of the travel, with the window", unit="m")
-    place_on_load: u1 = register("ends of the travel: 0 encoder of the motor, 1 of the load")
+    place_on_load: u1 = register("ends of the travel: 0 encoder of the motor, 1 of the load", option=True)
     breaking: f8 = register("magnitude of the command that breaks the axis loose", unit="V")
     window: f8 = register("position in-position window", unit="m")
     arrival: i8 = register("samples in the window until the axis is in position", unit="count")
@@ -70,7 +70,9 @@ class CascadeController(Registers):
     guarded: u1 = register("mailbox: 1 while faults switch off")
     known: u1 = register("mailbox: 1 while the position is known: beyond an end of the travel it is then switched off")
     event: u1 = register("mailbox: 1 in position, 2 fault; nothing goes on until the host has cleared it")
-    entry: i8 = register("mailbox: entry of the reference or command that the next sample takes", unit="count")
+    entry: i8 = register(
+        "mailbox: entry of the reference or command that the next sample takes", unit="count", range=(0, (1 << 62))
+    )
     reference: CascadeReference = block("what the axis should do")
     motor_sensor: PositionSensor = block("encoder of the motor")
     load_sensor: PositionSensor = block("encoder of the load")
@@ -94,11 +96,25 @@ class CascadeLines(Registers):
     command: f8 = register("command to the amplifier", unit="V", by=CONTROLLER)
 
 
+# ---- host actions
+
+
+@step
+def power_on(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines, position: float) -> None:
+    """At rest, the lines showing where, the loops closed and the reference at `position` [m]."""
+    stand_sensor(p.motor_sensor, c.motor_sensor, lines.motor)
+    stand_sensor(p.load_sensor, c.load_sensor, lines.load)
+    c.reference.position, c.count = position, lines.motor.count
+    c.on = c.known = lines.enable = lines.sync = 1
+
+
+# ---- a sample
+
+
 @hot_step
-def refer(c: CascadeController, feed: Feed) -> None:
-    """Take the next entry of the reference; behind the last one it stands where that is."""
-    position, velocity, acceleration, _ = feed
-    if c.entry < len(position):
+def refer(c: CascadeController, position: f8_signal, velocity: f8_signal, acceleration: f8_signal) -> None:
+    """Take the next entry of the reference, of which all parts are as long; behind the last one it stands there."""
+    if c.entry < len(position) and c.entry < len(velocity) and c.entry < len(acceleration):
         c.reference.position = position[c.entry]
         c.reference.velocity = velocity[c.entry]
         c.reference.acceleration = acceleration[c.entry]
@@ -163,17 +179,25 @@ def look_after(p: CascadeControllerParams, c: CascadeController, count: int) -> 
 
 
 @step
-def sample(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines, feed: Feed) -> None:
+def sample(
+    p: CascadeControllerParams,
+    c: CascadeController,
+    lines: CascadeLines,
+    position: f8_signal,
+    velocity: f8_signal,
+    acceleration: f8_signal,
+    command: f8_signal,
+) -> None:
     """Read, decide, command; where there are commands, the loops are open, and 0 comes behind the last one."""
     c.samples += 1
     read_word(p.motor_sensor, c.motor_sensor, lines.motor)
     read_word(p.load_sensor, c.load_sensor, lines.load)
-    output, command = 0.0, feed[3]
+    output = 0.0
     if c.on and len(command) > 0:
         output = command[c.entry] if c.entry < len(command) else 0.0
         c.entry += 1
     elif c.on:
-        refer(c, feed)
+        refer(c, position, velocity, acceleration)
         output = decide(p, c)
         note_peaks(c)
         if c.guarded:
@@ -189,13 +213,21 @@ def sample(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines
 
 @controls(CascadeControllerParams)
 @hot_step
-def control(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines, *feed: HostArray) -> None:
+def control(
+    p: CascadeControllerParams,
+    c: CascadeController,
+    lines: CascadeLines,
+    position: f8_signal,
+    velocity: f8_signal,
+    acceleration: f8_signal,
+    command: f8_signal,
+) -> None:
     """One tick: a sample every so many of them."""
     if c.left > 0:
         c.left -= 1
         if c.left == 0:
             lines.sync = 1
         return
-    sample(p, c, lines, feed)
+    sample(p, c, lines, position, velocity, acceleration, command)
     c.left = p.sample_ticks - 1
     lines.sync = 1 if c.left == 0 else 0

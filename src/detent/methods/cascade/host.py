@@ -73,7 +73,9 @@ class CascadeHost:
         self.controller.guarded = 1
         self.tick: float = self.params.plant.machine.period
         self.sample_ticks: int = self.params.controller.sample_ticks
-        self.machine = Machine[Any, Any](self.params, self.state, self.tick, recorder, advance=self._advance)
+        self.machine = Machine[Any, Any](
+            self.params, self.state, self.tick, recorder, advance=self._advance, feed=lambda: self.feed
+        )
         self.feed: Feed = along(np.array([start]), np.zeros(1), np.zeros(1))
         self._seen: Bytes | None = None
 

@@ -29,6 +29,7 @@ class CascadeMethod(Method[CascadeSpec]):
     senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:Cascade", "system:CascadeParams"
+    actions = ("power_on",)
     signals = "run:CASCADE_SIGNALS"
     timing = (
         "controller.left", "controller.reference.position", "lines.motor.count", "controller.motor_sensor.velocity",

@@ -18,7 +18,14 @@ from detent.kernel.elementary import one_less_exp
 from detent.kernel.loop import HostArray, lay_ready, ticks
 from detent.kernel.registers import Registers, block, i8, register
 from detent.kernel.step import hot_step
-from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines, Feed, control
+from detent.methods.cascade.controller import (
+    CascadeController,
+    CascadeControllerParams,
+    CascadeLines,
+    Feed,
+    control,
+    power_on,
+)
 from detent.methods.cascade.plant import CascadePlant, CascadePlantParams, latch_both, move, sense
 from detent.plant.linear_two_mass import fastest_rate
 from detent.plant.two_mass import TwoMass, stand_masses
@@ -109,14 +116,11 @@ def set_count(p: CascadeParams, motor: float, load: float) -> None:
 
 def switch_on(p: CascadeParams, r: Cascade, position: float) -> None:
     """Power-on at rest with motor and load at `position` [m], where the reference stands too."""
-    c, lines = r.controller, r.lines
+    lines = r.lines
     stand_masses(r.plant.machine, position)
     latch_both(p.plant, r.plant.machine, lines)
     stand_home(p.plant.home, r.plant.home, lines.home, position)
-    position_sensor.stand_sensor(p.controller.motor_sensor, c.motor_sensor, lines.motor)
-    position_sensor.stand_sensor(p.controller.load_sensor, c.load_sensor, lines.load)
-    c.reference.position, c.count = position, lines.motor.count
-    c.on = c.known = lines.enable = lines.sync = 1
+    power_on(p.controller, r.controller, lines, position)
 
 
 def set_off(p: CascadeParams, r: Cascade, velocity: float) -> None:

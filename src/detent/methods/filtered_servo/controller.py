@@ -27,7 +27,7 @@ from detent.control.pulse_generator import (
 from detent.kernel.compiled import unlikely
 from detent.kernel.loop import controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i1, i8, register, u1, u2, u4
-from detent.kernel.step import hot_step, step
+from detent.kernel.step import bounded, hot_step, step
 from detent.sensing.counted_speed import (
     PulseCounter,
     PulseCounterParams,
@@ -211,6 +211,7 @@ def skip_rest(p: FilteredControllerParams, c: FilteredController, lines: Filtere
 
 
 @hot_step
+@bounded(CLOCKS, "the clocks of a tick")
 def run_clocks(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """Ten decoder clocks in which something happens, until the rest is calm, and what follows from them."""
     if c.deviation.reset:

@@ -35,6 +35,7 @@ class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
     senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:FilteredServo", "system:FilteredServoParams"
+    actions = ("power_on", "go_to", "reset")
     every = 10
     seed = "encoder.seed"
     signals, timing = SIGNALS, TIMING

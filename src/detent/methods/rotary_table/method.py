@@ -21,6 +21,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     senses, begins = "derive:position_sensors", "mechanics.start_angle"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:RotaryTable", "system:RotaryTableParams"
+    actions = ("power_on",)
     every = 20
     seed = "detector.seed"
     signals = "run:SEQUENCE_SIGNALS"

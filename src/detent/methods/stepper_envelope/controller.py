@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from detent.control.step_rule import IDLE, PAUSE, STEP, StepRule, StepRuleParams, next_entry, next_step
 from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, word_within
-from detent.kernel.loop import HostArray, controls
+from detent.kernel.loop import HostArray, controls, i2_signal
 from detent.kernel.registers import CONTROLLER, Registers, block, i1, i8, register, u1, u4
-from detent.kernel.step import hot_step, step
+from detent.kernel.step import bounded, hot_step, step
 from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
 from detent.planning.step_ramp import StepRamp
 
@@ -82,7 +82,9 @@ def put_out(c: StepperController, lines: StepperLines, outcome: int) -> bool:
 
 
 @step
-def actuate(p: StepperControllerParams, c: StepperController, lines: StepperLines, up: Entries, down: Entries) -> bool:
+def actuate(
+    p: StepperControllerParams, c: StepperController, lines: StepperLines, up: i2_signal, down: i2_signal
+) -> bool:
     """The running period is over: begin the next one, and drive the lines; False at rest."""
     if c.timer.period == 0:
         c.timer.expires = c.now  # at rest time passes until a start, which takes effect at once
@@ -91,7 +93,10 @@ def actuate(p: StepperControllerParams, c: StepperController, lines: StepperLine
 
 @controls(StepperControllerParams)
 @hot_step
-def control(p: StepperControllerParams, c: StepperController, lines: StepperLines, up: Entries, down: Entries) -> None:
+@bounded(2, "a pause of no length, and the step behind it")
+def control(
+    p: StepperControllerParams, c: StepperController, lines: StepperLines, up: i2_signal, down: i2_signal
+) -> None:
     """One tick: begin the next period where one is over, after a pause of no length at once."""
     lines.pulse = 0
     running = True

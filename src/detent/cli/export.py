@@ -1,0 +1,101 @@
+"""`detent export` and `detent verify`: an axis as firmware, and the proof that it is the one that was simulated."""
+
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from detent.cli.app import NOT_DONE, File, Job, Json, Set, app, option
+from detent.cli.terminal import print_json, progress_bar, say, split_names, tell
+
+OUTPUT = "Folder for the export: a new one, an empty one, or that of an earlier export."
+PREFIX = "Prefix of all names in C. Default: from the name of the axis."
+TICKS = "Ticks of the golden run at most."
+ON = (
+    "Where to replay, comma-separated: host-gcc, host-clang, cortex-m0, cortex-m4, cortex-m7, rv32. Default: all there."
+)
+AGAINST = "Axis file: make the export anew, with --job as then, and compare."
+
+
+class Form(StrEnum):
+    """What an axis can be exported as."""
+
+    FIRMWARE = "firmware"
+
+
+@app.command()
+def export(
+    form: Annotated[Form, typer.Argument(help="What to write: firmware, the controller as C99.", show_default=False)],
+    file: File,
+    output: Annotated[Path, option("--output -o", "FOLDER", OUTPUT)],
+    job: Job = None,
+    prefix: Annotated[str, option("--prefix", "NAME", PREFIX)] = "",
+    ticks: Annotated[int, option("--ticks", "NUMBER", TICKS)] = 1_000_000,
+    overrides: Set = None,
+    *,
+    as_json: Json = False,
+) -> None:
+    """Write the controller of an axis as C99, with golden vectors of a simulated job.
+
+    Exit status: 0 written, 1 refused (FW01 to FW13: why, and what to do), 2 wrong input.
+    """
+    del form  # there is one
+    from detent.axis import load
+    from detent.export.write import export_firmware
+
+    axis = load(file, overrides or [])
+    with progress_bar(quiet=as_json) as progress:
+        progress(0.1, "simulating the job, translating the controller")
+        made = export_firmware(axis, output, job=job, prefix=prefix, ticks=ticks)
+    found: dict[str, Any] = dict(made.manifest)
+    if as_json:
+        print_json(found | {"folder": str(made.folder)})
+        return
+    unproven = found["not proven"]
+    say(f"{axis.name}: {found['functions']} functions in {made.folder / made.name}.c", "bold green")
+    tell(f"golden run: {found['job']}, {found['ticks']} ticks, hash {found['hash']}")
+    tell(f"options folded: {', '.join(f'{key} = {value}' for key, value in found['options'].items()) or 'none'}")
+    tell(f"not proven: {', '.join(f'{len(rows)} {what}' for what, rows in unproven.items())}; see manifest.json")
+    tell(f"next: detent verify {made.folder}")
+
+
+@app.command()
+def verify(
+    folder: Annotated[Path, typer.Argument(help="What `detent export firmware` wrote.", show_default=False)],
+    on: Annotated[list[str] | None, option("--on", "NAMES", ON)] = None,
+    against: Annotated[Path | None, option("--against", "FILE", AGAINST)] = None,
+    job: Job = None,
+    overrides: Set = None,
+    *,
+    as_json: Json = False,
+) -> None:
+    """Compile an export, replay its vectors here and on emulated processors, and compare all registers every tick.
+
+    Exit status: 0 all equal, 1 something differs or is not installed, 2 wrong input.
+    """
+    from detent.axis import load
+    from detent.export import verify as proving
+
+    with progress_bar(quiet=as_json) as progress:
+        axis = load(against, overrides or []) if against is not None else None
+        other = list(proving.differences(folder, axis, job)) if axis is not None else []
+        proofs = proving.verify(folder, split_names(on), progress)
+    left_out = {} if on else {one.name: one.missing for one in proving.TARGETS.values() if one.missing}
+    done = bool(proofs) and all(one.equal for one in proofs) and not other
+    if as_json:
+        print_json({"equal": done, "proofs": [asdict(p) for p in proofs], "differences": other, "not run": left_out})
+    else:
+        for one in proofs:
+            size = f", {one.flash} bytes of flash" if one.equal and one.level == "-Os" else ""
+            said = f"equal, hash {one.told}{size}" if one.equal else one.told
+            say(f"{one.target:<11} {one.level.split()[0] if one.level else '':<4} {said}", wrong=not one.equal)
+        for text in other:
+            say(text, wrong=True)
+        for name, tools in left_out.items():
+            tell(f"{name:<11} not run: needs {tools}")
+        if not proofs:
+            say("nothing was run: no compiler is installed", wrong=True)
+    if not done:
+        raise typer.Exit(NOT_DONE)

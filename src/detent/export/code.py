@@ -1,0 +1,252 @@
+"""The files of an export, as texts: header, code, parameters, replay, and the tables that say what stands where."""
+
+import csv
+import hashlib
+import io
+import json
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from importlib import resources
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+
+from detent import __version__
+from detent.export.translate.program import Program
+from detent.export.translate.text import code_text, comment_of, signals_text, struct_texts
+from detent.export.translate.values import c_field, number
+from detent.export.unit import LARGE, ControlUnit, members, ranged
+from detent.export.vectors import Golden
+from detent.kernel.registers import Field, Leaf, Registers, Width
+
+FLAGS = "-std=c99 -ffp-contract=off"
+WARNINGS = (
+    "-Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wundef -Wcast-qual -Wstrict-prototypes "
+    "-Wmissing-prototypes -Wdouble-promotion -Wswitch-default -Wimplicit-fallthrough"
+)
+
+
+@dataclass(frozen=True)
+class InC:
+    """One register as the code in C sees it."""
+
+    place: str
+    bits: str  # of its value, as an unsigned number of 64 bits
+    ctype: str
+    unsigned: str
+    bytes: int
+    length: int
+    float: bool
+
+
+def template(file: str, **given: Any) -> str:
+    """One file of the export from its template."""
+    environment = Environment(  # noqa: S701 - C, no HTML
+        undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["comment"] = comment_of
+    text = resources.files("detent.export").joinpath(file).read_text(encoding="utf-8")
+    return environment.from_string(text).render(**given)
+
+
+def place_of(path: str, controller: str, lines: str) -> str:
+    """A leaf of controller or lines in C."""
+    root, *parts = path.split(".")
+    return (controller if root == "c" else lines) + ".".join(c_field(part) for part in parts)
+
+
+def in_c(unit: ControlUnit, leaf: Leaf, controller: str, lines: str) -> InC:
+    """A leaf as C sees it."""
+    place = place_of(leaf.path, controller, lines) + ("[k]" if leaf.length else "")
+    unsigned = f"uint{8 * leaf.width.size}_t"
+    bits = f"{unit.name}_bits({place})" if leaf.width.is_float else f"(uint64_t)({unsigned}){place}"
+    return InC(place, bits, leaf.width.c_name, unsigned, leaf.width.size, leaf.length, leaf.width.is_float)
+
+
+def short_hash(*parts: bytes) -> str:
+    """First 64 bits of a hash, as hexadecimal digits."""
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16].upper()
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A row of params.csv."""
+
+    number: int
+    name: str
+    expression: str
+    width: str
+    unit: str
+    range: str
+    default: str
+    fixed: str  # why it is no part of the structure; empty where it can be changed at run time
+    meaning: str
+
+
+def parameters(program: Program, params: Registers) -> Iterator[Parameter]:
+    """Every parameter, in the order of declaration."""
+    for count, (prefix, registers, field, width) in enumerate(_fields(params, "")):
+        fixed = "an option, folded into the code" if (type(registers), field.name) in program.options else ""
+        value = getattr(registers, field.name)
+        default = f"{len(value)} values" if field.length else repr(value)
+        claimed = "" if field.range is None else f"{field.range[0]} to {field.range[1]}"
+        expression = "" if fixed else "p->" + ".".join(c_field(one) for one in (prefix + field.name).split("."))
+        yield Parameter(
+            count, prefix + field.name, expression, width.code, field.unit, claimed, default, fixed, field.doc
+        )
+
+
+def _fields(registers: Registers, prefix: str) -> Iterator[tuple[str, Registers, Field, Width]]:
+    for field, value in members(registers):
+        if field.block is not None:
+            yield from _fields(value, f"{prefix}{field.name}.")
+        elif field.width is not None:
+            yield prefix, registers, field, field.width
+
+
+def table(rows: Iterable[Any]) -> str:
+    """Rows of one dataclass as CSV."""
+    made = io.StringIO()
+    listed = [asdict(one) for one in rows]
+    writer = csv.DictWriter(made, list(listed[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(listed)
+    return made.getvalue()
+
+
+@dataclass(frozen=True)
+class Register:
+    """A row of registers.csv."""
+
+    number: int
+    name: str
+    expression: str
+    width: str
+    length: int
+    unit: str
+    written_by: str
+    meaning: str
+
+
+def registers(unit: ControlUnit) -> Iterator[Register]:
+    """Every register of the state by its number."""
+    for count, leaf in enumerate(unit.leaves):
+        expression = place_of(leaf.path, "c->", "l->")
+        name = ("controller" if leaf.path[0] == "c" else "lines") + leaf.path[1:]
+        yield Register(count, name, expression, leaf.width.code, leaf.length, leaf.unit, leaf.by, leaf.doc)
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A row of trace.csv: a function in C, and the step that it is."""
+
+    function: str
+    line: int
+    file: str
+    python_line: int
+    step: str
+    hash: str
+
+
+def traced(program: Program, code: str) -> Iterator[Traced]:
+    """Every function that is a step, with its line in the code."""
+    lines = code.splitlines()
+    for f in program.order:
+        head = program.signature(f)
+        file, _, line = f.place.rpartition(":")
+        yield Traced(f.cname, lines.index(head) + 1, file, int(line), f.py.__qualname__, short_hash(f.source.encode()))
+
+
+def _initialiser(program: Program, registers: Registers, depth: int = 1) -> str:
+    rows: list[str] = []
+    for field in program.fields(type(registers)):
+        value = getattr(registers, field.name)
+        if field.block is not None:
+            text = _initialiser(program, value, depth + 1)
+        elif field.length:
+            text = "{" + ", ".join(number(one).text for one in value) + "}"
+        else:
+            text = number(value).text
+        unit = f" /* {field.unit} */" if field.unit and field.block is None else ""
+        rows.append(f"{'    ' * depth}.{c_field(field.name)} = {text},{unit}\n")
+    return "{\n" + "".join(rows) + "    " * (depth - 1) + "}"
+
+
+def _checks(program: Program, params: Registers) -> Iterator[dict[str, Any]]:
+    rows = {one.name: one for one in parameters(program, params)}
+    for path, _, (lo, hi) in ranged(params):
+        row = rows.get(path)
+        if row is None or row.fixed:
+            continue
+        parts = [f"({row.expression} >= {number(lo).text})"] if lo > 0 or row.width[0] != "u" else []
+        parts += [f"({row.expression} <= {number(hi).text})"]
+        yield {"text": " && ".join(parts), "number": row.number + 1}
+
+
+def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick: str) -> dict[str, str]:
+    """All texts of an export by the names of their files, but for what tells of these files."""
+    name, params = unit.name, golden.params
+    source_hash = short_hash(*(f.source.encode() for f in program.order))
+    leaves = [in_c(unit, leaf, "c_.", "l_.") for leaf in unit.leaves]
+    images = {
+        kind: [in_c(unit, leaf, "c->", "l->") for leaf in unit.leaves if (leaf.length > LARGE) == large]
+        for kind, large in (("image", False), ("large", True))
+    }
+    code = code_text(program)
+    floats = any(leaf.float for leaf in leaves)
+    if floats and "<string.h>" not in code:
+        code = "#include <string.h>\n" + code
+    signals = [
+        {"code": value.width.code, "ctype": value.width.c_name, "bytes": value.width.size, "most": golden.signals[k][0]}
+        for k, value in enumerate(
+            one for one in program.steps[_tick_of(unit)].names.values() if one and one.kind == "signal" and one.width
+        )
+        if value.width is not None
+    ]
+    given = {
+        "name": name, "NAME": name.upper(), "version": __version__, "about": about, "tick": tick, "large": LARGE,
+        "source_hash": source_hash, "axis_hash": short_hash(bytes(params)), "layout_hash": f"{unit.layout_hash:08X}",
+        "structs": struct_texts(program, (unit.params, unit.controller, unit.lines)), "signals": signals_text(program),
+        "prototypes": "".join(_prototype(program, f) for f in program.steps.values() if f.entry),
+        "code": code, "checks": list(_checks(program, params)), "floats": floats, "images": list(images.items()),
+    }  # fmt: skip
+    made = {f"{name}.h": template("unit.h.in", **given), f"{name}.c": template("unit.c.in", **given)}
+    made[f"{name}_image.c"] = template("image.c.in", **given)
+    initialiser = _initialiser(program, params)
+    text = template("params.c.in", name=name, initialiser=initialiser)
+    made[f"{name}_params.c"] = f"#include <math.h>\n{text}" if "INFINITY" in initialiser else text
+    replay = given | {"signals": signals, "leaves": leaves}
+    made[f"{name}_replay.c"] = template("replay.c.in", **replay)
+    made["board.c"] = template("board.c.in", name=name)
+    made["params.csv"] = table(parameters(program, params))
+    made["registers.csv"] = table(registers(unit))
+    made["trace.csv"] = table(traced(program, made[f"{name}.c"]))
+    made["build.mk"] = f"{name}_CFLAGS := {FLAGS}\n{name}_SOURCES := {name}.c {name}_params.c\n"
+    return made
+
+
+def _tick_of(unit: ControlUnit) -> Any:
+    tick = next(iter(unit.entries.values()))
+    return getattr(tick, "py_func", tick)
+
+
+def _prototype(program: Program, f: Any) -> str:
+    doc = comment_of(f.doc.partition("\n")[0])
+    return f"/* {doc} */\n{program.signature(f)};\n"
+
+
+def as_json(data: Any) -> str:
+    """Plain data as a text that is the same every time."""
+    return json.dumps(data, indent=2, sort_keys=True) + "\n"
+
+
+def seconds(tick: float) -> str:
+    """A tick for people.
+
+    >>> seconds(1e-5)
+    '10 us'
+    """
+    unit, factor = next(((u, f) for u, f in (("s", 1.0), ("ms", 1e3), ("us", 1e6)) if tick * f >= 1.0), ("ns", 1e9))
+    value = tick * factor
+    return f"{round(value) if math.isclose(value, round(value)) else round(value, 3)} {unit}"

@@ -1,0 +1,194 @@
+"""Calls: of other steps, and of the few functions that a step may use."""
+
+import ast
+import builtins
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from detent.export.translate.expressions import Expressions
+from detent.export.translate.values import (
+    HIGHEST,
+    LOWEST,
+    RefusedError,
+    Value,
+    as_real,
+    as_truth,
+    as_whole,
+    cast,
+    join,
+    outside_language,
+    real,
+    truth,
+    type_of_local,
+    whole,
+    widen,
+)
+from detent.kernel import compiled
+
+
+class Calls(Expressions):
+    """Everything that is called."""
+
+    def e_Call(self, node: ast.Call) -> Value:  # noqa: N802 - as the syntax tree has it
+        """A step, or a function that is known."""
+        if node.keywords or any(isinstance(one, ast.Starred) for one in node.args):
+            raise outside_language(node, "keywords or a star in a call", "hand the arguments over in their order")
+        called = self.program.called(self.f, node)
+        if called is None:
+            got = f"a call of {ast.unparse(node.func)}"
+            raise RefusedError("FW03", node, got, "a step", "make it one, or an input")
+        if hasattr(called, "py_func") or called in self.program.steps:
+            return self._step(node, getattr(called, "py_func", called))
+        known = KNOWN.get(called)
+        if known is not None:
+            return known(self, node)
+        if getattr(called, "__module__", "") == "math":
+            got = f"{called.__name__} of the C library"
+            raise RefusedError("FW04", node, got, "sqrt, floor", "a table, or a routine of our own")
+        raise RefusedError("FW03", node, f"a call of {ast.unparse(node.func)}", "a step", "make it one, or an input")
+
+    def _step(self, node: ast.Call, target: Callable[..., Any]) -> Value:
+        g = self.program.function(target)
+        self.f.calls.add(target)
+        if self.final:
+            self.f.reaches.add(target)
+        if len(node.args) != len(g.parameters):
+            raise outside_language(node, f"{len(node.args)} arguments", f"hand over {len(g.parameters)}")
+        values = self.ordered(node.args)
+        args = [self._argument(node, g, name, value) for name, value in zip(g.parameters, values, strict=True)]
+        text = f"{g.cname}({', '.join(args)})"
+        if self.program.writes(self.f, node):
+            self.written()
+        if g.result_kind == "int":
+            made = g.result
+            return (
+                whole(text, "int32_t", 0, 0)
+                if made is None
+                else replace(made, text=text, ctype=type_of_local(made), literal=False)
+            )
+        if g.result_kind == "bool":
+            return truth(text, 0)
+        if g.result_kind == "float":
+            return real(text)
+        return Value(kind=g.result_kind, text=text, registers=g.result_class)
+
+    def _argument(self, node: ast.Call, g: Any, name: str, value: Value) -> str:
+        wanted: Value | None = g.names[name]
+        if value.kind in ("file", "signal"):
+            same = wanted is not None and (wanted.kind, wanted.registers, wanted.width) == (
+                value.kind, value.registers, value.width,
+            )  # fmt: skip
+            if not same:
+                raise outside_language(node, f"{ast.unparse(node)}, whose {name} is another", "hand over what it takes")
+            return value.text
+        if wanted is not None and wanted.kind == "float":
+            return as_real(value).text
+        if wanted is not None and wanted.kind == "bool":
+            return as_truth(value).text
+        value = as_whole(value)
+        if value.kind != "int" or (wanted is not None and wanted.kind != "int"):
+            raise outside_language(node, f"{value.kind} for {name}", "hand over what it takes")
+        made = join(wanted, whole(name, "", value.lo, value.hi))
+        made = replace(widen(wanted, made) if self.program.widens else made, text=name)
+        made = replace(made, ctype=type_of_local(made))
+        if wanted is None or (made.lo, made.hi) != (wanted.lo, wanted.hi):
+            if g.entry:
+                raise outside_language(node, f"{value.lo} to {value.hi} for {name} of an entry", "widen its annotation")
+            g.names[name] = made
+            self.program.changed = True
+        return cast(value, type_of_local(g.names[name])).text
+
+    # ---- functions that are known
+
+    def _one(self, node: ast.Call) -> Value:
+        if len(node.args) != 1:
+            raise outside_language(node, f"{len(node.args)} arguments", "hand over one")
+        return self.expr(node.args[0])
+
+    def k_sqrt(self, node: ast.Call) -> Value:
+        """Square root, which is rounded correctly everywhere."""
+        return real(f"sqrt({as_real(self._one(node)).text})")
+
+    def k_floor(self, node: ast.Call) -> Value:
+        """Whole number below."""
+        value = self._one(node)
+        if value.kind != "float":
+            return as_whole(value)
+        self.helper("to_i64", "")
+        return whole(f"{self.helper('floor', '')}({value.text})", "int64_t", LOWEST, HIGHEST)
+
+    def k_int(self, node: ast.Call) -> Value:
+        """Whole number towards zero; outside of 64 bits the nearest there is."""
+        value = self._one(node)
+        if value.kind != "float":
+            return as_whole(value)
+        return whole(f"{self.helper('to_i64', '')}({value.text})", "int64_t", LOWEST, HIGHEST)
+
+    def k_float(self, node: ast.Call) -> Value:
+        """The same number as a float."""
+        return as_real(self._one(node))
+
+    def k_bool(self, node: ast.Call) -> Value:
+        """A truth value; what is only unlikely is as true."""
+        return as_truth(self._one(node))
+
+    def k_abs(self, node: ast.Call) -> Value:
+        """Magnitude."""
+        value = as_whole(self._one(node))
+        return real(f"fabs({value.text})") if value.kind == "float" else self.magnitude(node, value)
+
+    def k_len(self, node: ast.Call) -> Value:
+        """Length of a signal."""
+        value = self._one(node)
+        if value.kind != "signal":
+            raise outside_language(node, "the length of no signal", "use the number")
+        return whole(f"{value.text}.length", "int32_t", 0, (1 << 31) - 1)
+
+    def _extreme(self, node: ast.Call, name: str) -> Value:
+        values = [as_whole(one) for one in self.ordered(node.args)]
+        if len(values) < 2:
+            raise outside_language(node, f"{name} of one argument", "hand over two or more")
+        if all(one.kind == "int" for one in values):
+            return self.extreme(name, values)
+        if not all(one.kind in ("int", "float") for one in values):
+            raise outside_language(node, f"{name} of no numbers", "use numbers")
+        text = as_real(values[0]).text
+        for one in values[1:]:
+            text = f"{self.helper(f'{name}_f8', '')}({text}, {as_real(one).text})"
+        return real(text)
+
+    def k_min(self, node: ast.Call) -> Value:
+        """The least."""
+        return self._extreme(node, "min")
+
+    def k_max(self, node: ast.Call) -> Value:
+        """The largest."""
+        return self._extreme(node, "max")
+
+    def k_power_of_two(self, node: ast.Call) -> Value:
+        """Two to a whole power, by the bits of its exponent."""
+        value = as_whole(self._one(node))
+        return real(f"{self.helper('power_of_two', '')}({cast(value, 'int64_t').text})")
+
+    def k_bits_of(self, node: ast.Call) -> Value:
+        """The bits of a float."""
+        text = f"{self.helper('bits_of', '')}({as_real(self._one(node)).text})"
+        return whole(text, "int64_t", LOWEST, HIGHEST)
+
+
+KNOWN: dict[Any, Callable[[Calls, ast.Call], Value]] = {
+    math.sqrt: Calls.k_sqrt,
+    math.floor: Calls.k_floor,
+    builtins.int: Calls.k_int,
+    builtins.float: Calls.k_float,
+    builtins.bool: Calls.k_bool,
+    builtins.abs: Calls.k_abs,
+    builtins.len: Calls.k_len,
+    builtins.min: Calls.k_min,
+    builtins.max: Calls.k_max,
+    compiled.unlikely: Calls.k_bool,
+    compiled.power_of_two: Calls.k_power_of_two,
+    compiled.bits_of: Calls.k_bits_of,
+}

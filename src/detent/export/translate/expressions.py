@@ -1,0 +1,332 @@
+"""Everything that has a value, but for calls."""
+
+import ast
+from dataclasses import replace
+
+from detent.export.translate.integers import Integers
+from detent.export.translate.values import (
+    ANY,
+    ATOM,
+    INTEGERS,
+    PRODUCT,
+    RANK,
+    SUM,
+    UNARY,
+    RefusedError,
+    Value,
+    as_real,
+    as_truth,
+    as_whole,
+    bits_of,
+    brought_to,
+    c_field,
+    cast,
+    decided,
+    in_brackets,
+    interval_of,
+    number,
+    outside_language,
+    real,
+    truth,
+    type_of_local,
+    whole,
+)
+from detent.kernel.registers import Field, Registers
+
+SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+REAL_SIGNS: dict[type[ast.operator], tuple[str, int]] = {
+    ast.Add: ("+", SUM),
+    ast.Sub: ("-", SUM),
+    ast.Mult: ("*", PRODUCT),
+}
+ORDER = "split the expression into lines"
+
+
+class Expressions(Integers):
+    """Names, registers, operators, conditions."""
+
+    # ---- order of effects
+
+    def is_impure(self, node: ast.AST) -> bool:
+        """True for what holds a call that writes registers."""
+        return any(isinstance(one, ast.Call) and self.program.writes(self.f, one) for one in ast.walk(node))
+
+    def suppose(self, node: ast.AST, *, holds: bool) -> None:
+        """A condition holds from here on, or does not; one whose calls write says nothing of what they wrote."""
+        if not self.is_impure(node):
+            self.learn(node, holds=holds)
+
+    def keep(self, value: Value) -> Value:
+        """A value in a variable, as it is now."""
+        if value.kind in ("file", "array", "signal") or value.is_constant or value.truth is not None:
+            return value
+        name, ctype = self.temporary(), type_of_local(value)
+        text = cast(value, ctype).text if value.kind == "int" else value.text
+        self.pre.append(f"const {ctype} {name} = {text};")
+        return replace(value, text=name, level=ATOM, ctype=ctype)
+
+    def ordered(self, nodes: list[ast.expr]) -> list[Value]:
+        """Values from left to right: what stands beside a call that writes is kept before it."""
+        impure = [self.is_impure(node) for node in nodes]
+        values: list[Value] = []
+        for k, node in enumerate(nodes):
+            value = self.expr(node)
+            later, earlier = any(impure[k + 1 :]), any(impure[:k])
+            if len(nodes) > 1 and not isinstance(node, ast.Constant) and (later or (impure[k] and earlier)):
+                if self.guarded:
+                    raise RefusedError("FW10", node, "a call that writes beside what reads", "one of them", ORDER)
+                value = self.keep(value)
+            values.append(value)
+        return values
+
+    # ---- names and registers
+
+    def e_Constant(self, node: ast.Constant) -> Value:  # noqa: N802 - as the syntax tree has it
+        """A number."""
+        if isinstance(node.value, bool | int | float):
+            return number(node.value)
+        raise outside_language(node, f"the constant {node.value!r}", "use numbers")
+
+    def e_Name(self, node: ast.Name) -> Value:  # noqa: N802
+        """A variable, an alias, or a number of the module."""
+        value = self.f.names.get(node.id)
+        if value is not None:
+            return self.refined(value)
+        if node.id in self.f.names or node.id in self.f.assigned:
+            # Nothing is known of it yet: a later turn over the program does.
+            return whole(node.id, "int32_t", 0, 0)
+        constant = self.f.globals.get(node.id)
+        if isinstance(constant, bool | float):
+            return number(constant)
+        if isinstance(constant, int):
+            made = number(constant)
+            return replace(made, text=self.program.constant(node.id, constant, made.text)) if self.final else made
+        raise outside_language(
+            node, f"the name {node.id}", "use parameters, registers, numbers of the module, and steps"
+        )
+
+    def member(self, base: Value, name: str) -> str:
+        """Text of a field of a register file."""
+        made = c_field(name)
+        return f"{base.text[1:]}.{made}" if base.text.startswith("&") else f"{base.text}->{made}"
+
+    def e_Attribute(self, node: ast.Attribute) -> Value:  # noqa: N802
+        """A register, or a block of registers."""
+        base = self.expr(node.value)
+        known: dict[str, Field] = base.registers.__fields__ if base.registers else {}
+        found = known.get(node.attr)
+        if base.registers is None or found is None:
+            raise outside_language(node, f"{ast.unparse(node)}, which is no register", "use registers")
+        return self.read(base.registers, found, self.member(base, node.attr))
+
+    def read(self, registers: type[Registers], found: Field, place: str) -> Value:
+        """What stands in a field."""
+        if found.block is not None:
+            return Value(kind="file", text="&" + place, registers=found.block)
+        if found.width is None:
+            raise outside_language(ast.Pass(), f"{place}, which has no width", "declare one")
+        if found.length:
+            trusted = found.range if registers in self.program.fixed else None
+            return Value(kind="array", text=place, width=found.width, length=found.length, within=trusted)
+        fixed = self.program.options.get((registers, found.name))
+        if fixed is not None:
+            return number(fixed)
+        if found.width.is_float:
+            return real(place)
+        lo, hi = interval_of(found.width)
+        if found.range is not None:
+            lo, hi = max(lo, int(found.range[0])), min(hi, int(found.range[1]))
+        return self.refined(whole(place, INTEGERS[found.width.code], lo, hi))
+
+    def check_index(self, node: ast.AST, array: Value, index: Value) -> None:
+        """Refuse an index that may lie outside."""
+        if index.kind != "int" or array.kind not in ("array", "signal"):
+            raise outside_language(node, f"{ast.unparse(node)}", "index an array of registers with an integer")
+        inside = index.lo >= 0 and (
+            index.hi < array.length if array.kind == "array" else (index.text, array.text) in self.facts.below
+        )
+        if self.final and not inside:
+            length = str(array.length) if array.kind == "array" else f"len({array.text})"
+            got = f"an index from {index.lo} to {index.hi}: {ast.unparse(node)}"
+            raise RefusedError("FW09", node, got, f"one from 0 to below {length}", "declare a range of the register")
+
+    def e_Subscript(self, node: ast.Subscript) -> Value:  # noqa: N802
+        """An element."""
+        array, index = self.expr(node.value), self.expr(node.slice)
+        self.check_index(node, array, index)
+        at = f"{array.text}.at" if array.kind == "signal" else array.text
+        text = f"{at}[{index.text}]"
+        if array.width is None:
+            raise outside_language(node, f"{text}, which has no width", "declare one")
+        if array.width.is_float:
+            return real(text)
+        lo, hi = interval_of(array.width)
+        if array.within is not None:
+            lo, hi = max(lo, int(array.within[0])), min(hi, int(array.within[1]))
+        return whole(text, INTEGERS[array.width.code], lo, hi)
+
+    # ---- operators
+
+    def e_BinOp(self, node: ast.BinOp) -> Value:  # noqa: N802
+        """An operator between two numbers."""
+        a, b = (as_whole(one) for one in self.ordered([node.left, node.right]))
+        if isinstance(node.op, ast.Div):
+            a, b = as_real(a), as_real(b)
+            return real(f"{in_brackets(a, PRODUCT)} / {in_brackets(b, UNARY)}", PRODUCT)
+        if "float" in (a.kind, b.kind):
+            if type(node.op) not in REAL_SIGNS:
+                raise outside_language(node, f"{type(node.op).__name__} of floats", "use + - * /")
+            sign, level = REAL_SIGNS[type(node.op)]
+            a, b = as_real(a), as_real(b)
+            return real(f"{in_brackets(a, level)} {sign} {in_brackets(b, level - 1)}", level)
+        if not a.kind == b.kind == "int":
+            raise outside_language(node, f"an operator of {a.kind} and {b.kind}", "use numbers")
+        return self.integer(node, a, b)
+
+    def e_UnaryOp(self, node: ast.UnaryOp) -> Value:  # noqa: N802
+        """``-`` and ``not``."""
+        if isinstance(node.op, ast.USub) and isinstance(node.operand, ast.Constant):
+            return self._negated(node.operand)
+        value = self.expr(node.operand)
+        if isinstance(node.op, ast.Not):
+            value = as_truth(value)
+            return decided(not value.truth) if value.truth is not None else truth(f"!{in_brackets(value, ATOM)}", UNARY)
+        if isinstance(node.op, ast.USub):
+            value = as_whole(value)
+            return real(f"-{in_brackets(value, ATOM)}", UNARY) if value.kind == "float" else self.negative(node, value)
+        raise outside_language(node, f"the operator {type(node.op).__name__}", "use - or not")
+
+    def _negated(self, node: ast.Constant) -> Value:
+        if isinstance(node.value, int | float):
+            return number(-node.value)
+        raise outside_language(node, f"- before {node.value!r}", "use numbers")
+
+    def e_BoolOp(self, node: ast.BoolOp) -> Value:  # noqa: N802
+        """``and`` and ``or`` of truth values; each part knows that those before it held, or did not."""
+        both = isinstance(node.op, ast.And)
+        before, mark, parts = self.facts.copy(), len(self.pre), list[str]()
+        for k, one in enumerate(node.values):
+            self.guarded += k > 0
+            value = as_truth(self.expr(one))
+            self.guarded -= k > 0
+            if k > 0 and len(self.pre) > mark:
+                raise RefusedError("FW10", node, "a call that writes inside and, or", "conditions that read", ORDER)
+            mark = len(self.pre)
+            self.suppose(one, holds=both)
+            if value.truth is None:
+                parts.append(in_brackets(value, UNARY))
+            elif value.truth != both:  # it decides
+                parts = [*parts, value.text] if parts else []
+                if not parts:
+                    self.facts = before
+                    return decided(not both)
+                break
+        self.facts = before
+        if self.is_impure(node):
+            self.written()
+        return self._linked(both, parts) if parts else decided(both)
+
+    def _linked(self, both: bool, parts: list[str]) -> Value:  # noqa: FBT001 - a truth value
+        if len(parts) == 1:
+            return truth(parts[0], UNARY)
+        return truth((" && " if both else " || ").join(parts))
+
+    def e_IfExp(self, node: ast.IfExp) -> Value:  # noqa: N802
+        """``a if test else b``."""
+        test = as_truth(self.expr(node.test))
+        if test.truth is not None:
+            return self.expr(node.body if test.truth else node.orelse)
+        before, mark = self.facts.copy(), len(self.pre)
+        self.guarded += 1
+        self.suppose(node.test, holds=True)
+        a = self.expr(node.body)
+        self.facts = before.copy()
+        self.suppose(node.test, holds=False)
+        b = self.expr(node.orelse)
+        self.facts = before
+        self.guarded -= 1
+        if len(self.pre) > mark or self.is_impure(node.body) or self.is_impure(node.orelse):
+            raise RefusedError("FW10", node, "a call that writes inside if-else", "values that are read", ORDER)
+        return self._chosen(node, test, a, b)
+
+    def _chosen(self, node: ast.AST, test: Value, a: Value, b: Value) -> Value:
+        if a.kind == b.kind == "bool":
+            return truth(f"({test.text}) ? {in_brackets(a, UNARY)} : {in_brackets(b, UNARY)}", ANY + 1)
+        if a.kind == b.kind == "file" and a.registers is b.registers:
+            return replace(a, text=f"({test.text}) ? {a.text} : {b.text}", level=ANY + 1)
+        a, b = as_whole(a), as_whole(b)
+        if "float" in (a.kind, b.kind):
+            a, b = as_real(a), as_real(b)
+            return real(f"({test.text}) ? {in_brackets(a, SUM)} : {in_brackets(b, SUM)}", ANY + 1)
+        if not a.kind == b.kind == "int":
+            raise outside_language(node, f"a choice between {a.kind} and {b.kind}", "choose between numbers")
+        lo, hi = min(a.lo, b.lo), max(a.hi, b.hi)
+        ctype, (a, b) = brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
+        a, b = (replace(c, text=f"({ctype}){in_brackets(c, UNARY)}", level=UNARY)
+                if c.ctype != ctype and not c.literal else c for c in (a, b))  # fmt: skip
+        return whole(f"({test.text}) ? {in_brackets(a, SUM)} : {in_brackets(b, SUM)}", ctype, lo, hi, ANY + 1)
+
+    # ---- comparisons
+
+    def e_Compare(self, node: ast.Compare) -> Value:  # noqa: N802
+        """A comparison, a chain of them, or membership in a tuple of numbers."""
+        if len(node.ops) == 1 and isinstance(node.ops[0], ast.In | ast.NotIn):
+            return self._membership(node, node.ops[0])
+        values = self.ordered([node.left, *node.comparators])
+        if len(node.ops) > 1:  # what stands in the middle is looked at twice
+            middle = zip(values[1:-1], node.comparators[:-1], strict=True)
+            kept = [self.keep(value) if self.is_impure(one) else value for value, one in middle]
+            values = [values[0], *kept, values[-1]]
+        pairs = zip(node.ops, values, values[1:], strict=False)
+        parts = [self.compared(node, type(op), a, b) for op, a, b in pairs]
+        if any(part.truth is False for part in parts):
+            return decided(value=False)
+        open_parts = [part for part in parts if part.truth is None]
+        if len(open_parts) < 2:
+            return open_parts[0] if open_parts else decided(value=True)
+        return truth(" && ".join(f"({part.text})" for part in open_parts))
+
+    def _membership(self, node: ast.Compare, op: ast.cmpop) -> Value:
+        if not isinstance(node.comparators[0], ast.Tuple):
+            raise outside_language(node, "membership in no tuple", "write the numbers in brackets")
+        value = self.expr(node.left)
+        value = self.keep(value) if self.is_impure(node.left) else value
+        parts = [self.compared(node, ast.Eq, value, self.expr(one)) for one in node.comparators[0].elts]
+        if any(part.truth for part in parts):
+            return decided(isinstance(op, ast.In))
+        texts = [f"({part.text})" for part in parts if part.truth is None]
+        if not texts:
+            return decided(isinstance(op, ast.NotIn))
+        text = " || ".join(texts)
+        return truth(text, ANY if len(texts) > 1 else ATOM) if isinstance(op, ast.In) else truth(f"!({text})", UNARY)
+
+    def compared(self, node: ast.AST, op: type[ast.cmpop], a: Value, b: Value) -> Value:
+        """One comparison; known where the intervals settle it."""
+        if op not in SIGNS:
+            raise outside_language(node, f"the comparison {op.__name__}", "use < <= > >= == != in")
+        if "float" in (a.kind, b.kind):
+            a, b = as_real(a), as_real(b)
+            return truth(f"{in_brackets(a, SUM)} {SIGNS[op]} {in_brackets(b, SUM)}")
+        if a.kind == b.kind == "bool" and a.truth is None and b.truth is None:
+            return truth(f"{in_brackets(a, UNARY)} {SIGNS[op]} {in_brackets(b, UNARY)}")
+        a, b = as_whole(a), as_whole(b)
+        if not a.kind == b.kind == "int":
+            raise outside_language(node, f"a comparison of {a.kind} and {b.kind}", "compare numbers")
+        settled = None if a.acts or b.acts else _settled(op, a, b)
+        if settled is not None:
+            return decided(settled)
+        bits = 64 if RANK[a.ctype] == 64 or RANK[b.ctype] == 64 else bits_of(a.lo, a.hi, b.lo, b.hi)
+        _, (a, b) = brought_to(bits, a, b)
+        return truth(f"{in_brackets(a, SUM)} {SIGNS[op]} {in_brackets(b, SUM)}")
+
+
+def _settled(op: type[ast.cmpop], a: Value, b: Value) -> bool | None:
+    """Truth of a comparison that the intervals settle."""
+    if op in (ast.Gt, ast.GtE):
+        a, b, op = b, a, ast.Lt if op is ast.Gt else ast.LtE
+    if op is ast.Lt:
+        return True if a.hi < b.lo else False if a.lo >= b.hi else None
+    if op is ast.LtE:
+        return True if a.hi <= b.lo else False if a.lo > b.hi else None
+    same = True if a.lo == a.hi == b.lo == b.hi else False if a.hi < b.lo or b.hi < a.lo else None
+    return same if op is ast.Eq or same is None else not same

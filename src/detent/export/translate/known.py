@@ -1,0 +1,193 @@
+"""What a condition, or a store, says of the values behind it, until something else is stored there.
+
+A fact is an interval of a place (a variable, a register) by its text in C, or an index below the length of a signal. A
+store into a field drops the facts about every register of that name: two names may mean one place. A call that writes
+drops those about all registers; a loop, those about everything that it writes.
+"""
+
+import ast
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from detent.export.translate.values import RefusedError, Value, outside_language
+
+if TYPE_CHECKING:
+    from detent.export.translate.program import Function, Program
+
+FLIPPED: dict[Any, Any] = {
+    ast.Lt: ast.Gt,
+    ast.LtE: ast.GtE,
+    ast.Gt: ast.Lt,
+    ast.GtE: ast.LtE,
+    ast.Eq: ast.Eq,
+    ast.NotEq: ast.NotEq,
+}
+OPPOSITE: dict[Any, Any] = {
+    ast.Lt: ast.GtE,
+    ast.LtE: ast.Gt,
+    ast.Gt: ast.LtE,
+    ast.GtE: ast.Lt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+}
+
+
+@dataclass
+class Facts:
+    """What is known here."""
+
+    bounds: dict[str, tuple[int, int]] = field(default_factory=dict[str, tuple[int, int]])
+    below: set[tuple[str, str]] = field(
+        default_factory=set[tuple[str, str]]
+    )  # index, and signal whose length it is under
+
+    def copy(self) -> "Facts":
+        """Independent copy."""
+        return Facts(dict(self.bounds), set(self.below))
+
+    def drop(self, affected: Callable[[str], bool]) -> None:
+        """Forget every place of which ``affected(text)`` holds."""
+        self.bounds = {text: bound for text, bound in self.bounds.items() if not affected(text)}
+        self.below = {pair for pair in self.below if not affected(pair[0])}
+
+    def either(self, other: "Facts") -> "Facts":
+        """What holds whichever way was gone."""
+        both = self.bounds.keys() & other.bounds.keys()
+        joined = {
+            text: (min(self.bounds[text][0], other.bounds[text][0]), max(self.bounds[text][1], other.bounds[text][1]))
+            for text in both
+        }
+        return Facts(joined, self.below & other.below)
+
+
+def is_register(text: str) -> bool:
+    """True for the text of a place in a register file."""
+    return "->" in text
+
+
+def field_of(text: str) -> str:
+    """Name of the last field of a place in a register file."""
+    return text.replace("->", ".").rpartition(".")[2]
+
+
+class Known:
+    """What a translation of one step knows at the line at which it is."""
+
+    def __init__(self, program: "Program", function: "Function", *, final: bool) -> None:
+        self.program, self.f, self.final = program, function, final
+        self.facts = Facts()
+        self.lines: list[str] = []
+        self.pre: list[str] = []  # lines that must come before the one that is being made
+        self.depth = 1
+        self.temporaries = 0
+        self.guarded = 0  # inside of what is not always evaluated
+
+    # ---- lines
+
+    def line(self, text: str) -> None:
+        """Write a line."""
+        self.lines.append("    " * self.depth + text)
+
+    def flush(self) -> None:
+        """Write what must come before the next line."""
+        for text in self.pre:
+            self.line(text)
+        self.pre = []
+
+    def temporary(self) -> str:
+        """A name that no step uses."""
+        self.temporaries += 1
+        return f"t{self.temporaries}_"
+
+    def expr(self, node: ast.AST) -> Value:
+        """Value of an expression."""
+        method = getattr(self, f"e_{type(node).__name__}", None)
+        if method is None:
+            raise outside_language(node, f"the expression {type(node).__name__}", "write it with what a step may hold")
+        return method(node)
+
+    # ---- facts
+
+    def stored(self, text: str, value: Value) -> None:
+        """A place has got a value."""
+        name = field_of(text)
+        register = is_register(text)
+
+        def affected(one: str) -> bool:
+            return is_register(one) and field_of(one) == name if register else one == text
+
+        self.facts.drop(affected)
+        if value.kind == "int":
+            self.facts.bounds[text] = (value.lo, value.hi)
+
+    def written(self) -> None:
+        """A call has written registers."""
+        self.facts.drop(is_register)
+
+    def looped(self, names: set[str]) -> None:
+        """A loop begins or ends that writes these variables, and any register."""
+
+        def affected(one: str) -> bool:
+            return is_register(one) or one in names
+
+        self.facts.drop(affected)
+
+    def refined(self, value: Value) -> Value:
+        """A value with what is known of its place."""
+        bound = self.facts.bounds.get(value.text)
+        if value.kind != "int" or bound is None:
+            return value
+        lo, hi = max(value.lo, bound[0]), min(value.hi, bound[1])
+        return replace(value, lo=lo, hi=hi) if lo <= hi else value
+
+    def learn(self, node: ast.AST, *, holds: bool) -> None:
+        """A condition holds from here on, or does not."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            self.learn(node.operand, holds=not holds)
+        elif isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And) == holds:
+            for part in node.values:
+                self.learn(part, holds=holds)
+        elif isinstance(node, ast.Compare) and (holds or len(node.ops) == 1):
+            places = [node.left, *node.comparators]
+            for op, left, right in zip(node.ops, places, places[1:], strict=False):
+                self._learn_pair(type(op) if holds else OPPOSITE.get(type(op), type(op)), left, right)
+        elif isinstance(node, ast.Name | ast.Attribute):
+            self._learn_pair(ast.NotEq if holds else ast.Eq, node, ast.Constant(0))
+
+    def _learn_pair(self, op: Any, left: ast.AST, right: ast.AST) -> None:
+        if op not in FLIPPED:
+            return
+        for how, place, limit in ((op, left, right), (FLIPPED[op], right, left)):
+            known = self._simple(place)
+            if known is None or known.kind != "int":
+                continue
+            if how is ast.Lt and isinstance(limit, ast.Call) and getattr(limit.func, "id", "") == "len":
+                with suppress(RefusedError):
+                    self.facts.below.add((known.text, self.expr(limit.args[0]).text))
+            bound = self._simple(limit)
+            if bound is not None and bound.kind == "int":
+                self._bind(how, known, bound)
+
+    def _simple(self, node: ast.AST) -> Value | None:
+        """Value of what can be read again without any effect."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.operand, ast.Constant):
+            return self.expr(node)
+        inner = node
+        while isinstance(inner, ast.Attribute):
+            inner = inner.value
+        return self.expr(node) if isinstance(inner, ast.Name | ast.Constant) else None
+
+    def _bind(self, op: Any, place: Value, limit: Value) -> None:
+        lo, hi = place.lo, place.hi
+        if op in (ast.Lt, ast.LtE):
+            hi = min(hi, limit.hi - (op is ast.Lt))
+        elif op in (ast.Gt, ast.GtE):
+            lo = max(lo, limit.lo + (op is ast.Gt))
+        elif op is ast.Eq:
+            lo, hi = max(lo, limit.lo), min(hi, limit.hi)
+        elif limit.is_constant:
+            lo, hi = lo + (lo == limit.lo), hi - (hi == limit.lo)
+        if lo <= hi and not place.is_constant:
+            self.facts.bounds[place.text] = (lo, hi)

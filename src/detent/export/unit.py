@@ -1,0 +1,106 @@
+"""The control unit of an axis: what of it is firmware, and what surrounds it.
+
+Its state is the controller and its lines; the simulation calls the very steps that are translated.
+"""
+
+import re
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from detent.axis import Axis
+from detent.errors import DetentError
+from detent.export.translate.program import Program
+from detent.export.translate.values import C_WORDS, RefusedError
+from detent.kernel.loop import control_of
+from detent.kernel.registers import Field, Leaf, Registers
+from detent.methods.registry import METHODS
+
+LARGE = 64  # elements of an array that enters the hash of every 1000th tick only if it has more
+
+
+@dataclass(frozen=True)
+class ControlUnit:
+    """Steps and registers that a microcontroller runs."""
+
+    name: str  # prefix of all names in C
+    params: type[Registers]
+    controller: type[Registers]
+    lines: type[Registers]
+    entries: Mapping[str, Callable[..., Any]]  # by their names in C: the tick first, then what the host does
+
+    @cached_property
+    def leaves(self) -> tuple[Leaf, ...]:
+        """Every register of the state, controller before lines, in the order of declaration; by number in a vector."""
+        return (*self.controller.leaves("c."), *self.lines.leaves("l."))
+
+    @cached_property
+    def layout_hash(self) -> int:
+        """Of names, widths and order of the registers."""
+        return zlib.crc32("\n".join(f"{leaf.path} {leaf.width.code} {leaf.length}" for leaf in self.leaves).encode())
+
+    def translated(self, params: Registers, tunable: bool = False) -> Program:  # noqa: FBT001, FBT002 - one switch
+        """The unit in C, with the options of these parameters folded in unless they stay tunable."""
+        roots = {self.params: "params", self.controller: "controller", self.lines: "lines"}
+        return Program(self.name, self.entries, self.params, {} if tunable else options_of(params), roots)
+
+
+def options_of(params: Registers) -> dict[tuple[type[Registers], str], float]:
+    """Values of the parameters that choose a variant, where their class has one value wherever it occurs."""
+    found: dict[tuple[type[Registers], str], set[float]] = {}
+
+    def walk(registers: Registers) -> None:
+        for field, value in members(registers):
+            if field.block is not None:
+                walk(value)
+            elif field.option:
+                found.setdefault((type(registers), field.name), set()).add(value)
+
+    walk(params)
+    return {place: values.pop() for place, values in found.items() if len(values) == 1}
+
+
+def members(registers: Registers) -> Iterator[tuple[Field, Any]]:
+    """Every field of a register file with what stands in it."""
+    for field in type(registers).__fields__.values():
+        yield field, getattr(registers, field.name)
+
+
+def outside_ranges(params: Registers) -> Iterator[tuple[str, float, tuple[float, float]]]:
+    """Parameters outside the ranges of their registers: path, value, range."""
+    for path, value, claimed in ranged(params):
+        if not claimed[0] <= value <= claimed[1]:
+            yield path, value, claimed
+
+
+def ranged(registers: Registers, prefix: str = "") -> Iterator[tuple[str, float, tuple[float, float]]]:
+    """Every value of which a range is declared: path, value, range."""
+    for field, value in members(registers):
+        if field.block is not None:
+            yield from ranged(value, f"{prefix}{field.name}.")
+        elif field.range is not None:
+            for k, one in enumerate(value if field.length else [value]):
+                yield f"{prefix}{field.name}" + (f"[{k}]" if field.length else ""), one, field.range
+
+
+def unit_of(axis: Axis, prefix: str = "") -> ControlUnit:
+    """The control unit of an axis; refused where its method has none (FW01), or the prefix is no name in C (FW13)."""
+    method = axis.method
+    if not method.actions:
+        able = ", ".join(name for name, one in METHODS.items() if one.actions)
+        got = f"{axis.name}, an axis of the method {method.name}"
+        raise RefusedError("FW01", None, got, f"one of {able}", "export an axis of such a method")
+    name = prefix or re.sub(r"\W+", "_", axis.name.lower(), flags=re.ASCII).strip("_") or "axis"
+    name = name if prefix or not name[0].isdigit() else f"axis_{name}"
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or name in C_WORDS:
+        raise RefusedError("FW13", None, f"the prefix {name!r}", "a name in C", "name another with --prefix")
+    params = method.parameters().__fields__["controller"].block
+    state = method.registers().__fields__
+    controller, lines = state["controller"].block, state["lines"].block
+    if params is None or controller is None or lines is None:
+        raise DetentError(f"{axis.name}: the method {method.name} has no controller of its own; name another axis")
+    steps = {f"{name}_control": control_of(params)}
+    steps |= {f"{name}_{action}": method.brought(f"controller:{action}") for action in method.actions}
+    return ControlUnit(name, params, controller, lines, steps)

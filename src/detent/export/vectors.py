@@ -1,0 +1,170 @@
+"""Golden vectors: all that a control unit is told in a simulated job, and the hash of its registers after every tick.
+
+A file is little endian: "DTNV", version (1 byte), layout hash (4); then records, a byte that says which:
+
+| record | follows | meaning |
+|---|---|---|
+| 1 write | register (2), element (2), value (8: its bits) | what host or plant have written |
+| 2 ticks | n (2), n bytes | n ticks; of each the low byte of the hash after it |
+| 3 check | hash (8), image of all registers | every 1000th tick, and after the last one |
+| 4 signal | number (1), length (4), values in their width | what the host has laid ready |
+| 0 end | ticks (8), hash of all bytes up to here (8) | |
+
+The state begins with all bits zero. An image is every register in the order of declaration, controller before lines,
+without padding; arrays of more than 64 elements are part of it, but enter the hash of a check only.
+"""
+
+import ctypes
+import struct
+from contextlib import suppress
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.export.unit import LARGE, ControlUnit
+from detent.kernel.image import add_bytes, add_rows, begin_hash
+from detent.kernel.loop import Bytes
+from detent.kernel.registers import PLANT, Leaf, Registers
+
+MAGIC, VERSION = b"DTNV", 1
+END, WRITE, TICKS, CHECK, SIGNAL = range(5)
+STRETCH = 1000  # ticks from check to check
+
+
+class EnoughError(Exception):
+    """As many ticks have been recorded as were asked for; the run need not go on."""
+
+
+class Golden:
+    """A witness of a run: makes the vectors of its control unit."""
+
+    def __init__(self, unit: ControlUnit, state: type[Registers], most: int) -> None:
+        self.unit, self.most, self.ticks = unit, most, 0
+        self.params: Any = None
+        self.hash = begin_hash()
+        self.signals: list[tuple[int, int]] = []  # of each signal: its largest length, and bytes of an element
+        self.parts = [MAGIC + struct.pack("<BI", VERSION, unit.layout_hash)]
+        self._places = {name[0]: state.__fields__[name].offset for name in ("controller", "lines")}
+        self._leaves, sizes = unit.leaves, ctypes.sizeof(unit.controller)
+        # Places in the memory of controller and lines, one behind the other.
+        self._offsets = [leaf.offset + (sizes if leaf.path.startswith("l.") else 0) for leaf in self._leaves]
+        small = [k for k, leaf in enumerate(self._leaves) if leaf.length <= LARGE]
+        self.picks: NDArray[np.int64] = (
+            np.concatenate([self._bytes_of(k) for k in small]) if small else np.zeros(0, int)
+        )
+        self._inputs = [k for k in small if self._leaves[k].by == PLANT]
+        where = np.cumsum([0, *(_size(self._leaves[k]) for k in small)])
+        self._columns = {k: slice(int(where[n]), int(where[n + 1])) for n, k in enumerate(small)}
+        self.rows: Bytes = np.zeros((STRETCH, len(self.picks)), np.uint8)
+        self._known = bytes(sizes + ctypes.sizeof(unit.lines))
+        self._feed: tuple[bytes, ...] = ()
+        self._state: Any = None
+
+    def _bytes_of(self, k: int) -> NDArray[np.int64]:
+        """Places of a register in the state of the axis."""
+        leaf = self._leaves[k]
+        first = leaf.offset + self._places[leaf.path[0]]
+        return np.arange(first, first + _size(leaf), dtype=np.int64)
+
+    # ---- what a run tells
+
+    def room(self) -> int:
+        """Ticks up to the next check, or to the end."""
+        return min(STRETCH - self.ticks % STRETCH, self.most - self.ticks)
+
+    def begin(self, params: Any, state: Any, feed: tuple[Any, ...]) -> None:
+        """Note what the host has written since the last stretch."""
+        if self.params is None:
+            self.params = params.controller.copy()
+        elif bytes(self.params) != bytes(params.controller):
+            raise EnoughError  # the parameters of a firmware stand still: what comes is another run
+        self._state = state
+        laid = tuple(bytes(memoryview(one).cast("B")) for one in feed)
+        for number, (new, one) in enumerate(zip(laid, feed, strict=True)):
+            size = ctypes.sizeof(one._type_)
+            if len(self.signals) <= number:
+                self.signals.append((0, size))
+            self.signals[number] = (max(self.signals[number][0], len(one)), size)
+            if number >= len(self._feed) or new != self._feed[number]:
+                self.parts.append(struct.pack("<BBI", SIGNAL, number, len(one)) + new)
+        self._feed = laid
+        now = self._memory()
+        for k, offset in enumerate(self._offsets):
+            size = _size(self._leaves[k])
+            self._write(k, self._known[offset : offset + size], now[offset : offset + size])
+        self._known = now
+
+    def take(self, ticks: int) -> None:
+        """Note the ticks of a stretch: what came along the lines, and the hash after each."""
+        if ticks:
+            begin, state = self._known, self._memory()
+            rows = self.rows[np.arange(self._state.tick - ticks + 1, self._state.tick + 1) % STRETCH]
+            low = np.zeros(ticks, np.uint8)
+            add_rows(self.hash, rows, low)
+            self._note_ticks(rows, low, begin)
+            self._known, self.ticks = state, self.ticks + ticks
+            if self.ticks % STRETCH == 0:
+                self._check()
+        if self.ticks >= self.most:
+            raise EnoughError
+
+    def _note_ticks(self, rows: Bytes, low: Bytes, begin: bytes) -> None:
+        """Inputs where they change, and the ticks between."""
+        old = {k: begin[self._offsets[k] : self._offsets[k] + _size(self._leaves[k])] for k in self._inputs}
+        first = {k: np.frombuffer(value, np.uint8) for k, value in old.items()}
+        changed = np.zeros(len(rows), bool)
+        for k in self._inputs:
+            seen = np.vstack([first[k][None, :], rows[:, self._columns[k]]])
+            changed |= (seen[1:] != seen[:-1]).any(axis=1)
+        edges = [0, *np.flatnonzero(changed).tolist(), len(rows)]
+        for begin_at, end in pairwise(edges):
+            if begin_at < len(rows) and changed[begin_at]:
+                for k in self._inputs:
+                    new = rows[begin_at, self._columns[k]].tobytes()
+                    self._write(k, old[k], new)
+                    old[k] = new
+            if end > begin_at:
+                self.parts.append(struct.pack("<BH", TICKS, end - begin_at) + low[begin_at:end].tobytes())
+
+    # ---- records
+
+    def _memory(self) -> bytes:
+        return bytes(self._state.controller) + bytes(self._state.lines)
+
+    def _write(self, k: int, old: bytes, new: bytes) -> None:
+        if old == new:
+            return
+        width = self._leaves[k].width.size
+        for element in range(len(new) // width):
+            part = new[element * width : (element + 1) * width]
+            if part != old[element * width : (element + 1) * width]:
+                self.parts.append(struct.pack("<BHH", WRITE, k, element) + part.ljust(8, b"\0"))
+
+    def _check(self) -> None:
+        parts = [self._known[o : o + _size(leaf)] for o, leaf in zip(self._offsets, self._leaves, strict=True)]
+        large = b"".join(part for part, leaf in zip(parts, self._leaves, strict=True) if leaf.length > LARGE)
+        if large:
+            add_bytes(self.hash, large)
+        self.parts.append(struct.pack("<BQ", CHECK, self.hash.number) + b"".join(parts))
+
+    def vectors(self) -> bytes:
+        """The file, once the run is over."""
+        if self.ticks % STRETCH:
+            self._check()
+        data, over_all = b"".join(self.parts) + struct.pack("<BQ", END, self.ticks), begin_hash()
+        add_bytes(over_all, data)
+        return data + struct.pack("<Q", over_all.number)
+
+
+def _size(leaf: Leaf) -> int:
+    return leaf.width.size * max(leaf.length, 1)
+
+
+def record(unit: ControlUnit, axis: Any, job: Any, most: int) -> Golden:
+    """Do a job, and make its vectors, of `most` ticks at most."""
+    golden = Golden(unit, axis.method.registers(), most)
+    with suppress(EnoughError):
+        axis.simulated.run(job, recorder=golden)
+    return golden

@@ -1,0 +1,263 @@
+"""`detent verify`: compile an export, replay its golden vectors, compare the hash of all registers after every tick.
+
+On this computer by its compilers, at three levels of optimisation and once where everything undefined traps; and on
+processors that qemu emulates. Compilers and emulators are found on the path; what is not installed is said.
+"""
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from detent.axis import Axis
+from detent.errors import DetentError, InputError
+from detent.export.code import FLAGS, WARNINGS, template
+from detent.export.write import MANIFEST, changed_files, export_firmware, read_manifest
+
+TIMEOUT = 600.0  # of one replay [s]
+TRAPS = "-O1 -g -fsanitize=undefined,address -fno-sanitize-recover=all -DFIRMWARE_CHECK"
+ARM = "-mthumb -ffreestanding -nostartfiles"
+SMALL = {"code": "0x00000000", "code_length": "4M", "data": "0x20000000", "data_length": "4M"}
+LARGE = {"code": "0x80000000", "code_length": "64M", "data": "0x84000000", "data_length": "32M"}
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where an export can be replayed."""
+
+    name: str
+    compiler: str
+    package: str  # of Debian
+    flags: str = ""
+    levels: tuple[str, ...] = ("-Os",)
+    emulator: str = ""
+    machine: str = ""  # arguments of the emulator
+    emulator_package: str = ""
+    memory: dict[str, str] | None = None  # of an emulated board
+    libraries: str = "-lm"
+
+    @property
+    def missing(self) -> str:
+        """What is not installed; empty where all is there."""
+        tools = [(self.compiler, self.package), (self.emulator, self.emulator_package)]
+        absent = [
+            f"{tool} (Debian: apt install {package})" for tool, package in tools if tool and not shutil.which(tool)
+        ]
+        return " and ".join(absent)
+
+
+def _host(name: str, compiler: str, *more: str) -> Target:
+    return Target(name, compiler, compiler, "-DON_HOST", ("-O0", "-O2", "-Os", *more))
+
+
+def _cortex(name: str, flags: str, board: str) -> Target:
+    return Target(
+        name, "arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi", f"{ARM} -mcpu={flags}",
+        emulator="qemu-system-arm", machine=f"-M {board}", emulator_package="qemu-system-arm", memory=SMALL,
+        libraries="-nostdlib -lm -lc -lgcc",
+    )  # fmt: skip
+
+
+TARGETS = {
+    one.name: one
+    for one in (
+        _host("host-gcc", "gcc", TRAPS),
+        _host("host-clang", "clang"),
+        _cortex("cortex-m0", "cortex-m0", "mps2-an385"),
+        _cortex("cortex-m4", "cortex-m4", "mps2-an386"),
+        _cortex("cortex-m7", "cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard", "mps2-an500"),
+        Target(
+            "rv32", "riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf",
+            "--specs=picolibc.specs -march=rv32imac -mabi=ilp32 -ffreestanding -nostartfiles",
+            emulator="qemu-system-riscv32", machine="-M virt -bios none", emulator_package="qemu-system-misc",
+            memory=LARGE, libraries="-nostdlib -lm -lc -lgcc",
+        ),
+    )
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What a replay on a target said."""
+
+    target: str
+    level: str
+    equal: bool
+    told: str  # the hash, or what differs
+    flash: int = 0  # code and constants of the unit, without parameters and the compiler's library [byte]
+    written: int = 0  # of .data and .bss: 0 [byte]
+
+
+def verify(
+    folder: str | Path, on: Sequence[str] = (), progress: Callable[[float, str], None] = lambda _share, _text: None
+) -> list[Proof]:
+    """Replay an export.
+
+    Parameters
+    ----------
+    folder : path
+        What `export_firmware` wrote.
+    on : sequence of str, optional
+        Names of `TARGETS`; default: all that are installed.
+    progress : callable, optional
+        ``progress(share, text)``.
+
+    Returns
+    -------
+    list of Proof
+        One for each target and level; one that is not `equal` for a target of `on` that is not installed.
+
+    Raises
+    ------
+    InputError
+        The folder is no export, or a target is none.
+    """
+    place = Path(folder)
+    manifest = read_manifest(place)
+    if manifest is None:
+        raise InputError.of_file(str(place), f"a folder without {MANIFEST}", "an export", "detent export firmware")
+    unknown = [name for name in on if name not in TARGETS]
+    if unknown:
+        raise DetentError(f"--on: got {', '.join(unknown)}; expected: {', '.join(TARGETS)}; name some of these")
+    chosen = [TARGETS[name] for name in on] or [one for one in TARGETS.values() if not one.missing]
+    edited = changed_files(place, manifest)
+    found = [Proof("files", "", equal=False, told=f"{name} is not as it was written") for name in edited]
+    runs = [(target, level) for target in chosen for level in target.levels]
+    for k, (target, level) in enumerate(runs):
+        progress(k / len(runs), f"{target.name} {level.split()[0]}")
+        if target.missing:
+            found.append(Proof(target.name, level, equal=False, told=f"not installed: {target.missing}"))
+        else:
+            found.append(_replayed(place, manifest, target, level))
+    return found
+
+
+def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str) -> Proof:
+    """Compile for a target, and run there."""
+    name, source = manifest["name"], folder.resolve()
+    with tempfile.TemporaryDirectory() as made:
+        work = Path(made)
+        strict = f"{target.compiler} {FLAGS} {level} {target.flags} {WARNINGS} -Werror -I{source} -c"
+        told = _run([*strict.split(), str(source / f"{name}.c"), "-o", "unit.o"], work)
+        for file in (f"{name}_params.c", f"{name}_image.c", f"{name}_replay.c", "board.c"):
+            vectors = f'-DVECTORS="{source / "vectors/job.vec"}"'
+            command = f"{target.compiler} {FLAGS} {level} {target.flags} -I{source} -c".split()
+            told = told or _run([*command, vectors, str(source / file), "-o", f"{file}.o"], work)
+        told = told or _run(_linking(work, target, level), work)
+        if told:
+            return Proof(target.name, level, equal=False, told=f"does not compile: {told}")
+        flash, written = _sizes(target, work)
+        text = _answer(target, work, source)
+    lines = text.splitlines()
+    equal = f"equal {manifest['ticks']} {manifest['hash']}" in lines
+    return Proof(target.name, level, equal, manifest["hash"] if equal else told_of(folder, lines), flash, written)
+
+
+def _linking(work: Path, target: Target, level: str) -> list[str]:
+    more: list[str] = []
+    if target.memory is not None:
+        (work / "board.ld").write_text(template("board.ld.in", **target.memory), encoding="utf-8")
+        more = ["-T", "board.ld", "-Wl,-e," + ("entry_" if target.name == "rv32" else "Start")]
+    objects = sorted(one.name for one in work.glob("*.o"))
+    return [
+        target.compiler,
+        *level.split(),
+        *target.flags.split(),
+        *more,
+        *objects,
+        "-o",
+        "unit",
+        *target.libraries.split(),
+    ]
+
+
+def _run(command: list[str], work: Path) -> str:
+    """Run a compiler; what it says where it refuses, else nothing."""
+    done = subprocess.run(command, cwd=work, capture_output=True, text=True, check=False)  # noqa: S603 - found on the path
+    return "" if done.returncode == 0 else (done.stderr or done.stdout or "no word").strip().splitlines()[0]
+
+
+def _answer(target: Target, work: Path, source: Path) -> str:
+    """What the replay says."""
+    command = ["./unit", str(source / "vectors/job.vec")]
+    if target.emulator:
+        rest = "-nographic -monitor none -serial none -semihosting-config enable=on,target=native -kernel unit"
+        command = [target.emulator, *target.machine.split(), *rest.split()]
+    try:
+        done = subprocess.run(  # noqa: S603 - found on the path
+            command, cwd=work, capture_output=True, text=True, errors="replace", check=False, timeout=TIMEOUT,
+            stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return f"no answer within {TIMEOUT:g} s"
+    return done.stdout + done.stderr
+
+
+def _sizes(target: Target, work: Path) -> tuple[int, int]:
+    """Bytes of the unit: what stands in flash, and what is written."""
+    tool = target.compiler.replace("gcc", "size") if target.emulator else "size"
+    done = subprocess.run([tool, "unit.o"], cwd=work, capture_output=True, text=True, check=False)  # noqa: S603 - as above
+    lines = done.stdout.splitlines()
+    if done.returncode or len(lines) < 2:
+        return 0, 0
+    text, data, bss = (int(word) for word in lines[1].split()[:3])
+    return text, data + bss
+
+
+def told_of(folder: Path, lines: Sequence[str]) -> str:
+    """A replay's own words for people: tick, and registers by their names."""
+    rows = (folder / "registers.csv").read_text(encoding="utf-8").splitlines()[1:]
+    names = [row.split(",", 2)[1] for row in rows]
+    tick = next((line.split()[1] for line in lines if line.startswith("differs ")), "")
+    found: list[str] = []
+    for line in lines:
+        words = line.split()
+        if words[:1] == ["register"] and len(words) == 6:
+            got, wanted, at = words[3:]
+            found.append(f"{names[int(words[1])]}[{words[2]}] {got} for {wanted} by tick {at}")
+    if not tick:
+        return " ".join(lines[-3:]) or "no answer"
+    return f"differs in tick {tick}: {'; '.join(found) or 'the hash alone'}"
+
+
+def differences(folder: str | Path, axis: Axis, job: str | Path | None = None) -> Iterator[str]:
+    """Make an export anew, and tell where it is another: the steps that were edited, and the files.
+
+    Parameters
+    ----------
+    folder : path
+        What `export_firmware` wrote.
+    axis : Axis
+        What it was written from.
+    job : path, optional
+        The job of its vectors; default: as of `export_firmware`.
+
+    Yields
+    ------
+    str
+        A sentence for each difference.
+    """
+    place = Path(folder)
+    manifest = read_manifest(place)
+    if manifest is None:
+        raise InputError.of_file(str(place), f"a folder without {MANIFEST}", "an export", "detent export firmware")
+    with tempfile.TemporaryDirectory() as made:
+        new = export_firmware(
+            axis, Path(made) / "new", job=job, prefix=manifest["name"], ticks=max(1, int(manifest["ticks"]))
+        )
+        before, after = (_steps(one) for one in (place, new.folder))
+        for step in sorted(before.keys() | after.keys()):
+            if before.get(step) != after.get(step):
+                yield f"{step} is another step than at the export"
+        files: dict[str, str] = dict(new.manifest["files"])
+        for name in sorted(files.keys() | manifest["files"].keys()):
+            if files.get(name) != manifest["files"].get(name):
+                yield f"{name} is another file"
+
+
+def _steps(folder: Path) -> dict[str, str]:
+    """Hash of every step by its file and name."""
+    rows = [row.split(",") for row in (folder / "trace.csv").read_text(encoding="utf-8").splitlines()[1:]]
+    return {f"{row[2]} {row[4]}": row[5] for row in rows}

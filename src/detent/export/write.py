@@ -1,0 +1,168 @@
+"""`detent export firmware`: from an axis and a job to a folder of C with its golden vectors."""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from detent import __version__
+from detent.axis import Axis
+from detent.errors import DetentError, InputError
+from detent.export.code import FLAGS, as_json, seconds, texts
+from detent.export.translate.values import RefusedError
+from detent.export.unit import options_of, outside_ranges, unit_of
+from detent.export.vectors import record
+from detent.files.text import write_errors
+
+MANIFEST = "manifest.json"
+TICKS = 1_000_000  # of the golden run at most
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written."""
+
+    folder: Path
+    name: str  # prefix of all names in C
+    manifest: Mapping[str, Any]
+
+
+def export_firmware(
+    axis: Axis, folder: str | Path, *, job: str | Path | None = None, prefix: str = "", ticks: int = TICKS
+) -> Exported:
+    """Write the controller of an axis as C99, with golden vectors of a job.
+
+    Parameters
+    ----------
+    axis : Axis
+        An axis of a method whose controller is firmware.
+    folder : path
+        A folder that is empty, that holds an earlier export and nothing else, or that is not there.
+    job : path, optional
+        Job whose run gives the golden vectors; default: a short one of the method.
+    prefix : str, optional
+        Of all names in C; default: from the name of the axis.
+    ticks : int
+        Ticks of the golden run at most, 1 or more.
+
+    Returns
+    -------
+    Exported
+        What was written; the same input gives the same bytes.
+
+    Raises
+    ------
+    RefusedError
+        The axis cannot be firmware; nothing is written.
+    DetentError
+        The folder holds other files (FW14), or the job made no tick.
+    """
+    target = Path(folder)
+    if ticks < 1:
+        raise DetentError(f"--ticks: got {ticks}; expected: 1 or more; try: leave it out for {TICKS}")
+    refuse_other_files(target)
+    unit = unit_of(axis, prefix)
+    loaded = axis.load_job(job) if job is not None else axis.method.trial_job(axis.spec)
+    golden = record(unit, axis, loaded, ticks)
+    if golden.params is None or golden.ticks == 0:
+        raise DetentError(f"{loaded.name}: got a job of no ticks; expected: one with motion; try: another --job")
+    for path, value, (lo, hi) in outside_ranges(golden.params):
+        got = f"{path} = {value}"
+        raise RefusedError("FW12", None, got, f"{lo} to {hi}", "change the axis file until the value fits")
+    program = unit.translated(golden.params)
+    made: dict[str, bytes] = {
+        name: text.encode()
+        for name, text in texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)).items()
+    }
+    made["vectors/job.vec"] = golden.vectors()
+    manifest: dict[str, Any] = {
+        "detent": __version__, "name": unit.name, "axis": axis.name, "method": axis.method.name, "job": loaded.name,
+        "ticks": golden.ticks, "hash": f"{golden.hash.number:016x}", "flags": FLAGS,
+        "values": {row.key: row.value for row in axis.check().rows},
+        "options": {f"{one.__name__}.{key}": value for (one, key), value in options_of(golden.params).items()},
+        "functions": len(program.order),
+        "loops": sorted(f"{where}: {text}" for where, text in program.notes.loops),
+        "not proven": {
+            "ranges that only their declaration says": sorted(f"{w}: {t}" for w, t in program.notes.claims),
+            "stores and arithmetic that may wrap": sorted(f"{w}: {t}" for w, t in program.notes.wraps),
+        },
+    }  # fmt: skip
+    made["README.md"] = readme(manifest, unit.name, seconds(axis.simulated.tick)).encode()
+    manifest["files"] = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(made.items())}
+    made[MANIFEST] = as_json(manifest).encode()
+    _write(target, made)
+    return Exported(target, unit.name, manifest)
+
+
+def read_manifest(folder: Path) -> dict[str, Any] | None:
+    """The manifest of an export; None where there is none that can be read."""
+    try:
+        found: Any = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return cast("dict[str, Any]", found) if isinstance(found, dict) and "files" in found else None
+
+
+def changed_files(folder: Path, manifest: Mapping[str, Any]) -> list[str]:
+    """Files of an export that are absent, or are not as it wrote them."""
+    found: list[str] = []
+    for name, wanted in manifest["files"].items():
+        file = folder / name
+        if not file.is_file() or hashlib.sha256(file.read_bytes()).hexdigest() != wanted:
+            found.append(name)
+    return found
+
+
+def refuse_other_files(folder: Path) -> None:
+    """Refuse a folder that holds what no export wrote (FW14)."""
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise InputError.of_file(str(folder), "FW14: a file", "a folder", "name another --output")
+    present = sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
+    manifest = read_manifest(folder) or {"files": {}}
+    others = [name for name in present if name not in {*manifest["files"], MANIFEST}]
+    edited = [name for name in changed_files(folder, manifest) if name in present]
+    if others or edited:
+        got = f"FW14: a folder with {', '.join((others or edited)[:5])}, which no export wrote or somebody has edited"
+        raise InputError.of_file(str(folder), got, "an empty folder, or an earlier export", "name another --output")
+
+
+def _write(folder: Path, made: Mapping[str, bytes]) -> None:
+    """Write all files beside the folder, then put it in its place: never a part of an export."""
+    part = folder.with_name(f"{folder.name}.part")
+    with write_errors(folder):
+        shutil.rmtree(part, ignore_errors=True)
+        for name, data in made.items():
+            file = part / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(data)
+        if folder.exists():
+            shutil.rmtree(folder)
+        part.rename(folder)
+
+
+def readme(manifest: Mapping[str, Any], name: str, tick: str) -> str:
+    """One page: what to call when."""
+    return f"""# {manifest["axis"]} as firmware
+
+Written by detent {manifest["detent"]} from an axis of the method {manifest["method"]}. C99, no heap, no globals.
+
+1. Compile `{name}.c` and `{name}_params.c` with `{manifest["flags"]}`. Never `-ffast-math`.
+2. At power-on: check `{name}_selftest() == 0` and `{name}_check_params(&{name}_defaults) == 0`, set a
+   `{name}_controller` and a `{name}_lines` to zero bytes, write what the sensors show into the lines, and call
+   `{name}_power_on`.
+3. Every {tick}: write the lines that the plant writes, call `{name}_control`, and put the others out. Calls with the
+   same pointers must not interrupt one another; two axes have two sets of registers.
+4. `registers.csv` names every register and `params.csv` every parameter. A `{name}_params` in RAM may be exchanged
+   between two ticks, by its pointer.
+
+The simulation handles what happened in a tick at its end: equal bits need the same calls in the same order.
+
+`detent verify` on this folder replays `vectors/job.vec`: {manifest["ticks"]} ticks of {manifest["job"]}, and compares
+the hash of all registers after every one. On a board, compile `{name}_image.c` and `{name}_replay.c` too, give them
+`{name}_get` and `{name}_put`, and call `{name}_replay()`: 0 is equal.
+"""

@@ -1,0 +1,193 @@
+"""Numbered tests of the firmware specification, as far as it is built: four methods, on this computer and emulated."""
+
+import os
+import shutil
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import detent
+from detent.export.code import FLAGS, WARNINGS
+from detent.export.verify import TARGETS, verify
+from detent.export.write import export_firmware, read_manifest
+
+pytestmark = [pytest.mark.compiled, pytest.mark.process]
+JOBS = {
+    "cascade": "slide_moves.toml",
+    "filtered_servo": "slide_moves.toml",
+    "phase_servo": "moves.csv",
+    "rotary_table": "index_sequence.toml",
+}
+SHORT, LONG = 2_000, 20_000  # ticks
+EMULATED = [name for name in TARGETS if not name.startswith("host-")]
+
+
+@pytest.fixture(scope="session")
+def exported(tmp_path_factory):
+    """An export of a method with so many ticks; each is made once."""
+
+    @cache
+    def make(method: str, ticks: int = SHORT) -> Path:
+        axis = detent.load(detent.example(f"{method}.toml"))
+        place = tmp_path_factory.mktemp("firmware") / "out"
+        return export_firmware(axis, place, job=detent.example(JOBS[method]), ticks=ticks).folder
+
+    return make
+
+
+def needs(*names: str) -> None:
+    missing = [TARGETS[name].missing for name in names if TARGETS[name].missing]
+    if missing:
+        pytest.skip(f"not installed: {'; '.join(missing)}")
+
+
+def proven(folder: Path, *names: str) -> None:
+    needs(*names)
+    found = verify(folder, names)
+    assert len(found) == sum(len(TARGETS[name].levels) for name in names)
+    wanted = read_manifest(folder)["hash"]
+    assert [(one.target, one.level, one.told) for one in found if not one.equal or one.told != wanted] == []
+
+
+def copied(folder: Path, place: Path) -> tuple[Path, str]:
+    shutil.copytree(folder, place)
+    return place, read_manifest(folder)["name"]
+
+
+def sources(name: str) -> list[str]:
+    return [f"{name}.c", f"{name}_params.c", f"{name}_image.c", f"{name}_replay.c", "board.c"]
+
+
+def run(command: str, place: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*command.split(), *words], cwd=place, capture_output=True, text=True, check=False)
+
+
+def test_01_the_cascade_is_equal_here(exported):
+    proven(exported("cascade"), "host-gcc")
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("method", JOBS)
+def test_01_10_19_each_is_equal_here_without_a_warning_or_anything_undefined(exported, method):
+    folder = exported(method, LONG)
+    assert read_manifest(folder)["ticks"] == LONG
+    proven(folder, "host-gcc", "host-clang")
+
+
+@pytest.mark.parametrize("target", EMULATED)
+def test_02_03_04_the_cascade_is_equal_on_each_processor(exported, target):
+    proven(exported("cascade"), target)
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("method", [pytest.param("cascade", marks=pytest.mark.long), *list(JOBS)[1:]])
+def test_02_03_04_each_is_equal_on_each_processor(exported, method):
+    proven(exported(method, LONG), *EMULATED)
+
+
+@pytest.mark.long
+def test_01_the_filtered_servo_is_equal_for_a_million_clocks(exported):
+    proven(exported("filtered_servo", 100_000), "host-gcc", "cortex-m4")
+
+
+def test_12_ranges_hold_in_every_standard_job():
+    script = "from tests.acceptance.test_golden_bits import all_bits; all_bits(whole=False)"
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "DETENT_CHECK_RANGES": "1"}
+    root = Path(__file__).parents[2]
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=root, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-500:]
+
+
+SELFTEST = '#include "NAME.h"\nint main(void) { return (int)NAME_selftest(); }\n'
+
+
+def test_13_the_self_test_finds_fast_arithmetic(exported, tmp_path):
+    place, name = copied(exported("cascade"), tmp_path / "out")
+    (place / "self.c").write_text(SELFTEST.replace("NAME", name))
+    for flags, wanted in (("-std=c99", 0), ("-std=c99 -O2", 0), ("-std=c99 -O2 -ffast-math", 4)):
+        made = run(f"gcc {flags} -w self.c {name}.c -o self -lm", place)
+        assert made.returncode == 0, made.stderr
+        found = run("./self", place).returncode
+        assert (found != 0) == (wanted != 0), flags
+
+
+def test_14_a_constant_changed_by_hand_is_found_with_tick_and_register(exported, tmp_path):
+    place, name = copied(exported("cascade"), tmp_path / "out")
+    code = (place / f"{name}.c").read_text()
+    assert "2.0 * p->limits.following_error" in code
+    (place / f"{name}.c").write_text(code.replace("c->samples = c->samples + 1", "c->samples = c->samples + 2").replace(
+        "(uint64_t)c->samples + (uint64_t)1", "(uint64_t)c->samples + (uint64_t)2"
+    ))  # fmt: skip
+    assert (place / f"{name}.c").read_text() != code
+    needs("host-gcc")
+    files, *runs = verify(place, ["host-gcc"])
+    assert files.told == f"{name}.c is not as it was written"
+    assert all("differs in tick 1: controller.samples[0]" in one.told for one in runs), runs
+
+
+def test_17_a_bit_of_the_vectors_flipped_is_found_wherever_it_is(exported, tmp_path):
+    place, name = copied(exported("cascade"), tmp_path / "out")
+    flags = f"gcc {FLAGS} -O1 -DON_HOST -fsanitize=undefined,address -fno-sanitize-recover=all"
+    made = run(flags, place, *sources(name), "-o", "unit", "-lm")
+    assert made.returncode == 0, made.stderr
+    data = (place / "vectors/job.vec").read_bytes()
+    assert run("./unit vectors/job.vec", place).returncode == 0
+    for k in range(20):
+        spoiled = bytearray(data)
+        spoiled[len(data) * k // 20] ^= 1 << k % 8
+        (place / "spoiled.vec").write_bytes(bytes(spoiled))
+        done = run("./unit spoiled.vec", place)
+        assert done.returncode in (1, 2), (k, done.stdout, done.stderr[:300])
+
+
+def test_21_nothing_is_written_that_is_not_handed_over(exported, tmp_path):
+    place, name = copied(exported("cascade"), tmp_path / "out")
+    assert run(f"gcc {FLAGS} -Os -c {name}.c -o unit.o", place).returncode == 0
+    sections = {row.split()[0]: int(row.split()[1]) for row in run("size -A unit.o", place).stdout.splitlines()[2:-2]}
+    assert (sections.get(".data", 0), sections.get(".bss", 0)) == (0, 0)
+    undefined = {row.split()[-1] for row in run("nm -u unit.o", place).stdout.splitlines()}
+    assert undefined <= {"memcpy", "memset", "sqrt", "__stack_chk_fail", "_GLOBAL_OFFSET_TABLE_"}
+
+
+def test_23_the_code_is_c_plus_plus_too(exported, tmp_path):
+    if not shutil.which("g++"):
+        pytest.skip("not installed: g++ (Debian: apt install g++)")
+    place, name = copied(exported("cascade"), tmp_path / "out")
+    made = run(f"g++ -x c++ -std=c++17 -Wall -Wextra -c {name}.c -o unit.o", place)
+    assert (made.returncode, made.stderr) == (0, "")
+
+
+def test_24_an_export_elsewhere_is_the_same_byte_for_byte(exported, tmp_path):
+    script = (
+        "import sys, detent\nfrom detent.export.write import export_firmware\n"
+        "axis = detent.load(detent.example('cascade.toml'))\n"
+        f"export_firmware(axis, 'there', job=detent.example('slide_moves.toml'), ticks={SHORT})\n"
+    )
+    environment = os.environ | {"TZ": "Asia/Tokyo", "LC_ALL": "C", "HOME": str(tmp_path), "PYTHONHASHSEED": "7"}
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, env=environment, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-500:]
+    folder = exported("cascade")
+    for path in sorted(folder.rglob("*")):
+        if path.is_file():
+            assert path.read_bytes() == (tmp_path / "there" / path.relative_to(folder)).read_bytes(), path.name
+
+
+def test_31_a_parameter_out_of_its_range_is_told_by_its_number(exported, tmp_path):
+    place, name = copied(exported("cascade"), tmp_path / "out")
+    (place / "check.c").write_text(
+        f'#include "{name}.h"\nint main(void) {{\n    {name}_params p = {name}_defaults;\n'
+        f"    if ({name}_check_params(&p) != 0) {{ return 255; }}\n    p.load_sensor.span = 64;\n"
+        f"    return (int){name}_check_params(&p);\n}}\n"
+    )
+    made = run(f"gcc {FLAGS} {WARNINGS} -Werror check.c {name}.c {name}_params.c -o check -lm", place)
+    assert made.returncode == 0, made.stderr
+    row = (place / "params.csv").read_text().splitlines()[run("./check", place).returncode]
+    assert row.split(",")[1] == "load_sensor.span"

@@ -1,0 +1,66 @@
+"""`detent export firmware` and `detent verify`: what they print, and their status."""
+
+from pathlib import Path
+
+import pytest
+from tests.unit.test_cli import call
+
+import detent
+from detent.export import verify as proving
+
+pytestmark = pytest.mark.compiled
+CASCADE, ZOOM = str(detent.example("cascade.toml")), str(detent.example("zoom.toml"))
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def export(*more: object):
+    return call("export", "firmware", CASCADE, "--output", "out", "--ticks", "50", *more)
+
+
+def test_an_export_says_what_it_wrote_and_what_comes_next():
+    answer = export()
+    assert answer.status == 0
+    assert "golden run: one move" in answer.out or "50 ticks, hash " in answer.out
+    assert "next: detent verify out" in answer.out
+    assert Path("out/cascade_axis.c").exists()
+    data = export("--prefix", "slide", "--json").data
+    assert (data["name"], data["ticks"]) == ("slide", 50)
+    assert Path("out/slide.c").exists()
+    assert not Path("out/cascade_axis.c").exists()
+
+
+def test_refusals_have_status_1_and_a_wrong_folder_2():
+    refused = call("export", "firmware", ZOOM, "--output", "out")
+    assert (refused.status, "FW01" in refused.err, Path("out").exists()) == (1, True, False)
+    Path("out").mkdir()
+    Path("out/mine").write_text("mine")
+    answer = export()
+    assert (answer.status, "FW14" in answer.err) == (2, True)
+    assert call("verify", "out").status == 2
+
+
+def test_verify_tells_each_target_and_what_is_not_installed(monkeypatch):
+    export()
+    gone = proving.Target("gone", "no-such-gcc", "gcc-gone")
+    monkeypatch.setattr(proving, "TARGETS", {"gone": gone})
+    answer = call("verify", "out")
+    assert answer.status == 1
+    assert "gone        not run: needs no-such-gcc (Debian: apt install gcc-gone)" in answer.out
+    assert call("verify", "out", "--on", "gone").status == 1
+    data = call("verify", "out", "--json").data
+    assert data == {"equal": False, "proofs": [], "differences": [], "not run": {"gone": gone.missing}}
+
+
+@pytest.mark.process
+def test_verify_replays_here_and_compares_with_the_axis():
+    export()
+    same = call("verify", "out", "--on", "host-gcc", "--against", CASCADE)
+    assert same.status == 0, same.out + same.err
+    assert "bytes of flash" in same.out
+    other = call("verify", "out", "--on", "host-gcc", "--against", CASCADE, "--set", "method.position_gain=41")
+    assert other.status == 1
+    assert "cascade_axis_params.c is another file" in other.out + other.err

@@ -1,0 +1,233 @@
+"""An export of the cascade axis: its files, its vectors, and what is refused."""
+
+import csv
+import json
+import struct
+
+import pytest
+
+import detent
+from detent.errors import DetentError, InputError
+from detent.export.code import seconds
+from detent.export.translate.values import RefusedError
+from detent.export.unit import options_of, outside_ranges, unit_of
+from detent.export.vectors import CHECK, END, SIGNAL, TICKS, WRITE, record
+from detent.export.verify import TARGETS, Target, differences, told_of, verify
+from detent.export.write import MANIFEST, export_firmware, read_manifest
+from detent.kernel.image import FNV_BASIS, FNV_PRIME, WHOLE, begin_hash
+from detent.methods.cascade.controller import CascadeControllerParams
+
+pytestmark = pytest.mark.compiled
+MOST = 2200
+
+
+@pytest.fixture(scope="module")
+def axis():
+    return detent.load(detent.example("cascade.toml"))
+
+
+@pytest.fixture(scope="module")
+def folder(axis, tmp_path_factory):
+    return export_firmware(axis, tmp_path_factory.mktemp("firmware") / "out", ticks=MOST).folder
+
+
+def rows(folder, name) -> list[dict[str, str]]:
+    with (folder / name).open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_the_files_are_those_of_the_manifest(folder):
+    manifest = json.loads((folder / MANIFEST).read_text())
+    present = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert present == {*manifest["files"], MANIFEST}
+    assert (manifest["ticks"], manifest["method"], manifest["name"]) == (MOST, "cascade", "cascade_axis")
+    assert manifest["options"]["CascadeLawParams.position_pid"] == 0
+
+
+def test_a_folded_option_is_a_row_of_the_parameters_without_an_expression(folder):
+    found = {row["name"]: row for row in rows(folder, "params.csv")}
+    assert found["law.position_pid"]["fixed"]
+    assert found["law.position_pid"]["expression"] == ""
+    assert found["law.period"]["expression"] == "p->law.period"
+    assert float(found["law.period"]["default"]) == 0.00025
+    assert found["motor_sensor.delay"]["range"] == "0 to 63"
+    header = (folder / "cascade_axis.h").read_text()
+    assert "position_pid" not in header
+    assert "position_on_load" not in header
+
+
+def test_every_register_has_its_number_and_its_writer(folder, axis):
+    found = rows(folder, "registers.csv")
+    assert [int(row["number"]) for row in found] == list(range(len(unit_of(axis).leaves)))
+    by = {row["name"]: row["written_by"] for row in found}
+    assert by["lines.motor.count"] == "plant"
+    assert by["lines.command"] == "controller"
+    assert by["controller.on"] == ""
+
+
+def parsed(data: bytes, leaves, signals=(8, 8, 8, 8)):
+    """Records of a file of vectors: (kind, content)."""
+    k, image = 9, sum(leaf.width.size * max(leaf.length, 1) for leaf in leaves)
+    while k < len(data):
+        kind = data[k]
+        if kind == WRITE:
+            yield kind, struct.unpack_from("<HHq", data, k + 1)
+            k += 13
+        elif kind == TICKS:
+            (n,) = struct.unpack_from("<H", data, k + 1)
+            yield kind, data[k + 3 : k + 3 + n]
+            k += 3 + n
+        elif kind == CHECK:
+            yield kind, (struct.unpack_from("<Q", data, k + 1)[0], data[k + 9 : k + 9 + image])
+            k += 9 + image
+        elif kind == SIGNAL:
+            number, length = struct.unpack_from("<BI", data, k + 1)
+            yield kind, (number, length)
+            k += 6 + length * signals[number]
+        else:
+            assert kind == END
+            yield kind, struct.unpack_from("<Q", data, k + 1)[0]
+            k += 17
+
+
+def test_the_vectors_hold_every_tick_and_a_check_every_thousand(folder, axis):
+    leaves = unit_of(axis).leaves
+    data = (folder / "vectors/job.vec").read_bytes()
+    assert data[:5] == b"DTNV\1"
+    found = list(parsed(data, leaves))
+    assert sum(len(one) for kind, one in found if kind == TICKS) == MOST == found[-1][1]
+    checks = [one for kind, one in found if kind == CHECK]
+    assert len(checks) == 3
+    assert f"{checks[-1][0]:016x}" == read_manifest(folder)["hash"]
+    assert checks[-1][0] & 0xFF == [one for kind, one in found if kind == TICKS][-1][-1]
+    inputs = {leaf.path for leaf in leaves if leaf.by == "plant"}
+    later = [leaves[one[0]].path for kind, one in found[len(found) // 2 :] if kind == WRITE]
+    assert set(later) <= inputs | {"c.entry"}
+    assert {number for kind, (number, _) in ((k, o) for k, o in found if k == SIGNAL)} == {0, 1, 2, 3}
+
+
+def test_the_hash_is_fnv_1a_over_the_image_of_the_state(axis):
+    unit = unit_of(axis)
+    golden = record(unit, axis, axis.method.trial_job(axis.spec), 1)
+    found = dict(parsed(golden.vectors(), unit.leaves))
+    wanted = FNV_BASIS
+    for byte in found[CHECK][1]:
+        wanted = (wanted ^ byte) * FNV_PRIME & WHOLE
+    assert found[CHECK][0] == wanted == golden.hash.number
+    assert begin_hash().number == FNV_BASIS
+
+
+def test_the_same_input_gives_the_same_bytes(folder, axis, tmp_path):
+    again = export_firmware(axis, tmp_path / "another name", ticks=MOST).folder
+    for name in [*read_manifest(folder)["files"], MANIFEST]:
+        assert (again / name).read_bytes() == (folder / name).read_bytes(), name
+
+
+def test_every_function_is_traced_to_its_step(folder):
+    code = (folder / "cascade_axis.c").read_text().splitlines()
+    found = rows(folder, "trace.csv")
+    assert len(found) == read_manifest(folder)["functions"] == len({row["function"] for row in found})
+    source = __import__("pathlib").Path(detent.__file__).parents[1]
+    for row in found:
+        assert f"{row['function']}(" in code[int(row["line"]) - 1]
+        python = (source / row["file"]).read_text().splitlines()[int(row["python_line"]) - 1]
+        assert python.startswith(f"def {row['step'].rpartition('.')[2]}(")
+
+
+# ---- refusals
+
+
+def test_an_earlier_export_is_replaced_and_other_files_are_not(axis, tmp_path):
+    place = tmp_path / "out"
+    export_firmware(axis, place, ticks=10)
+    export_firmware(axis, place, ticks=20)
+    assert read_manifest(place)["ticks"] == 20
+    (place / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match=r"FW14: a folder with mine\.txt") as caught:
+        export_firmware(axis, place, ticks=10)
+    assert caught.value.exit_status == 2
+    (place / "mine.txt").unlink()
+    (place / "cascade_axis.c").write_text("edited")
+    with pytest.raises(InputError, match=r"FW14: a folder with cascade_axis\.c"):
+        export_firmware(axis, place, ticks=10)
+    assert (place / "cascade_axis.c").read_text() == "edited"
+    with pytest.raises(InputError, match="FW14: a file"):
+        export_firmware(axis, place / "cascade_axis.h")
+
+
+def test_a_method_without_a_control_unit_is_refused():
+    with pytest.raises(RefusedError, match=r"FW01: .*zoom.*expected: one of .*cascade"):
+        unit_of(detent.load(detent.example("zoom.toml")))
+
+
+@pytest.mark.parametrize("prefix", ["1st", "a b", "int", "ä"])
+def test_a_prefix_that_is_no_name_in_c_is_refused(axis, prefix):
+    with pytest.raises(RefusedError, match="FW13"):
+        unit_of(axis, prefix)
+
+
+def test_a_parameter_outside_its_range_is_found():
+    p = CascadeControllerParams()
+    p.motor_sensor.delay = 64
+    assert list(outside_ranges(p)) == [("motor_sensor.delay", 64, (0, 63))]
+
+
+def test_an_option_that_differs_between_two_blocks_stays_a_parameter():
+    p = CascadeControllerParams()
+    assert {name for _, name in options_of(p)} == {
+        "position_on_load", "velocity_on_load", "position_pid", "place_on_load",
+    }  # fmt: skip
+
+
+def test_ticks_must_be_some(axis, tmp_path):
+    with pytest.raises(DetentError, match="--ticks: got 0"):
+        export_firmware(axis, tmp_path / "out", ticks=0)
+
+
+# ---- proof
+
+
+@pytest.mark.parametrize(("tick", "text"), [(1e-5, "10 us"), (0.002, "2 ms"), (2.0, "2 s"), (6.25e-5, "62.5 us")])
+def test_a_tick_is_told_in_its_unit(tick, text):
+    assert seconds(tick) == text
+
+
+def test_what_is_not_installed_is_said_with_its_package(folder, monkeypatch):
+    absent = Target("no-such", "no-such-gcc", "gcc-no-such", emulator="no-such-qemu", emulator_package="qemu-no")
+    monkeypatch.setitem(TARGETS, "no-such", absent)
+    (proof,) = verify(folder, ["no-such"])
+    assert not proof.equal
+    assert "no-such-gcc (Debian: apt install gcc-no-such) and no-such-qemu" in proof.told
+
+
+def test_a_folder_or_a_target_that_is_none_is_refused(folder, tmp_path, axis):
+    with pytest.raises(InputError, match="an export"):
+        verify(tmp_path)
+    with pytest.raises(DetentError, match="--on: got z80; expected: host-gcc"):
+        verify(folder, ["z80"])
+    with pytest.raises(InputError, match="an export"):
+        list(differences(tmp_path, axis))
+
+
+def test_what_a_replay_says_is_told_by_names(folder, axis):
+    number = [leaf.path for leaf in unit_of(axis).leaves].index("c.law.command")
+    told = told_of(folder, [f"register {number} 0 5 6 1000", "differs 17"])
+    assert told == "differs in tick 17: controller.law.command[0] 5 for 6 by tick 1000"
+    assert told_of(folder, ["differs 3"]) == "differs in tick 3: the hash alone"
+    assert told_of(folder, ["bad vectors"]) == "bad vectors"
+    assert told_of(folder, []) == "no answer"
+
+
+def test_an_edited_step_and_another_axis_are_found(folder, axis, tmp_path):
+    assert list(differences(folder, axis)) == []
+    other = axis.replace({"method.position_gain": 41.0})
+    told = list(differences(folder, other))
+    assert "cascade_axis_params.c is another file" in told
+    assert not any("step" in one for one in told)
+    copy = export_firmware(axis, tmp_path / "out", ticks=MOST).folder
+    text = (copy / "trace.csv").read_text()
+    old = next(row["hash"] for row in rows(copy, "trace.csv") if row["step"] == "limit_command")
+    (copy / "trace.csv").write_text(text.replace(old, "0" * 16))
+    assert list(differences(copy, axis)) == [
+        "detent/control/cascade_law.py limit_command is another step than at the export"
+    ]
