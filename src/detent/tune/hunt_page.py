@@ -45,7 +45,7 @@ def hunted_page(found: "Hunted") -> Page:
             lead=found.sentence,
         ),
         cards=_cards(found),
-        notes=[Note("note", one[0].upper() + one[1:] + ".") for one in found.told],
+        notes=[Note("note", one[0].upper() + one[1:].replace("`", "") + ".") for one in found.told],
         sections=[
             Section("What it does", [kinds, _worst(found)]),
             Section("Why", [_cobweb(found), _assumed(found)]),

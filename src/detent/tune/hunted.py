@@ -16,6 +16,7 @@ from detent.files.screen import Block, OnScreen, Screen
 from detent.files.text import check_target, write_text
 from detent.methods.load import AxisFile
 from detent.methods.method import untold
+from detent.methods.registry import METHODS
 from detent.page.table import TextTable
 from detent.tune.choice import Progress, value_of
 from detent.tune.dead_band import Band, Map, band_map, least_band
@@ -293,6 +294,11 @@ def hunt(  # noqa: PLR0913 - what may be asked
         )
     told = progress or untold
     spec: Any = file.spec
+    if (dead_band or map_it) and not METHODS[spec.axis.method].standstill(spec).band:
+        raise DetentError(
+            f"{file.file}: got an axis of the method {spec.axis.method}, which has no dead band of its integral; "
+            "expected: a method with one, such as cascade; leave dead_band and map out"
+        )
     found = standstill(spec, starts, seed, on_counts=on_counts, progress=_part(told, 0.0, 0.3))
     ensemble = found.ensemble
     cured = band = made = None

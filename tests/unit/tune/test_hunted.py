@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import detent
 from detent.cli.app import app
 from detent.errors import DetentError
+from detent.methods.cascade.standstill import CascadeEnsemble
 from detent.tune import dead_band, hunted, standstill
 
 STICKS = [*both(coulomb="20 N", static="30 N", stribeck="0 m/s"), "drive.command_step=0 V", "encoder.resolution=0.1 um"]
@@ -163,3 +164,10 @@ def test_a_method_that_is_not_watched_says_so():
     done = run(str(EXAMPLES / "print_head.toml"), "--json")
     assert done.exit_code == 2
     assert "not watched at standstill" in json.loads(done.stdout)["error"]
+
+
+@pytest.mark.parametrize("words", [{"dead_band": True}, {"map_it": True}])
+def test_a_method_without_a_dead_band_says_so(words, monkeypatch):
+    monkeypatch.setattr(CascadeEnsemble, "band", "")
+    with pytest.raises(DetentError, match="no dead band of its integral"):
+        rigid(30, 0).hunt(**words)
