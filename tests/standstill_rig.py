@@ -1,5 +1,6 @@
 """Axes at standstill: the cascade example with its gains by hand, and what the tune specification calls rigid."""
 
+import random
 from collections.abc import Sequence
 from typing import Any
 
@@ -41,3 +42,30 @@ def told(found: Any) -> str:
     """A line to be read where a test fails."""
     kinds = [(one.name, len(one.found), one.swing("motor"), one.swing("load"), one.period) for one in found.kinds]
     return f"{dict(found.shares)} {kinds}"
+
+
+def drawn(number: int) -> Axis:
+    """One of the axes that are drawn at random: rigid, coupled or with a gap, with any friction, gains and encoder."""
+    chance = random.Random(number)
+    shape = ("rigid", "coupled", "gap")[number % 3]
+    coulomb, load, ratio = chance.uniform(0, 40), chance.uniform(0, 40), chance.uniform(1, 2)
+    speed = chance.choice([0.0, chance.uniform(0, 5)])
+    loop, count = chance.uniform(15, 70), chance.choice([0.0, 10 ** chance.uniform(-1.3, 0.7)])
+    integral = chance.choice([0.0, 10 ** chance.uniform(-0.3, 1.48), 10 ** chance.uniform(-0.3, 1.48)])
+    on_load = shape != "rigid" and chance.random() < 0.5
+    values = [
+        *both(coulomb=f"{coulomb:.4g} N", static=f"{ratio * coulomb:.4g} N", stribeck=f"{speed:.4g} mm/s"),
+        f"encoder.resolution={count:.4g} um", f"drive.delay={chance.randrange(3)}", "drive.command_step=0 V",
+        f"method.velocity_integral={integral:.4g} kV/m", f"method.position_gain={10 ** chance.uniform(1, 2):.4g}",
+        f"method.velocity_gain={100 * loop / 45:.4g} V*s/m",
+    ]  # fmt: skip
+    if shape == "rigid":
+        return axis(RIGID, values)
+    values += both(
+        "load_friction", coulomb=f"{load:.4g} N", static=f"{ratio * load:.4g} N", stribeck=f"{speed:.4g} mm/s"
+    )
+    if shape == "gap":
+        values.append(f"mechanics.coupling.backlash={10 ** chance.uniform(0.7, 2):.4g} um")
+    if on_load:
+        values += ["method.feedback.position=load", f"load_encoder.resolution={count:.4g} um"]
+    return axis(TEXT, values)

@@ -29,6 +29,7 @@ from detent.runs import Run, Timing
 
 if TYPE_CHECKING:
     from detent.methods.linear import LinearModel
+    from detent.tune.hunted import Hunted
     from detent.tune.tuned import Tuned
 
 KEPT_ROWS = 100_000  # rows in memory beside a trace file, 40 s at the usual rate: the report draws from these
@@ -325,6 +326,50 @@ class Axis(OnScreen):
 
         tried = None if job is None else self._job(job)
         return tune(self.file, sensitivity=ms, overshoot=overshoot, goal=goal, hold=hold, job=tried, progress=progress)
+
+    def hunt(  # noqa: PLR0913 - what may be asked
+        self,
+        *,
+        starts: int = 24,
+        seed: int = 1,
+        on_counts: bool = False,
+        dead_band: bool = False,
+        map_it: bool = False,
+        progress: Progress | None = None,
+    ) -> "Hunted":
+        """Watch the axis at standstill, from many starts: whether it hunts, and what stops it.
+
+        Parameters
+        ----------
+        starts : int
+            How many, at least 12; a third each are small, wide and hard. The first are the same however many there are.
+        seed : int
+            What they are drawn from.
+        on_counts : bool
+            Targets lie on counts of the encoder.
+        dead_band : bool
+            Find the least dead band of the integral that stops it.
+        map_it : bool
+            Try dead bands and integral gains beside one another.
+        progress : callable, optional
+            ``progress(share, text)``.
+
+        Returns
+        -------
+        Hunted
+            Verdict, kinds of hunting, rule of thumb, dead band.
+
+        Raises
+        ------
+        DetentError
+            The method is not watched at standstill, or there are too few starts.
+        """
+        from detent.tune.hunted import hunt
+
+        return hunt(
+            self.file, starts=starts, seed=seed, on_counts=on_counts, dead_band=dead_band, map_it=map_it,
+            progress=progress,
+        )  # fmt: skip
 
     def envelopes(self) -> Mapping[str, Any]:
         """Table of permissible frequencies, an `Envelope`, of each motor by name, between its extremes at power-on.

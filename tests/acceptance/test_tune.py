@@ -3,6 +3,7 @@
 import json
 import math
 import random
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
 from tests.standstill_rig import both, example, rigid, told
 from tests.tolerance_rig import QUESTION, fill, fill_killed
+from tests.standstill_rig import RIGID, both, drawn, example, rigid, told
 
 import detent
 from detent.analysis.sampled_loop import SampledLoop
@@ -22,12 +24,13 @@ from detent.methods.cascade.tuning import CascadeTuning
 from detent.methods.filtered_servo.tuning import FilteredTuning
 from detent.methods.load import axis_of, load_spec
 from detent.methods.moves.job import one_move
+from detent.methods.registry import METHODS
 from detent.methods.rotary_table.loop import HeldLoop
 from detent.methods.tuning import Bounds
 from detent.tune import store
 from detent.tune.choice import Chooser
 from detent.tune.plants import Plants
-from detent.tune.standstill import standstill
+from detent.tune.standstill import look, standstill
 
 CASCADE = EXAMPLES / "cascade.toml"
 EXAMPLE = by_hand(CASCADE.read_text(encoding="utf-8"))  # as the specification means it
@@ -530,3 +533,73 @@ def test_35_a_store_outlives_kills_at_any_moment(tmp_path, cases, kills):
         assert (killed / path.name).read_bytes() == path.read_bytes()
     with pytest.raises(InputError, match="another seed"), store.opened(killed, {**QUESTION, "hash": "", "seed": 2}):
         pass
+LEAPING = [*(drawn(number) for number in (6, 12, 63, 81)), rigid(40, 0, stribeck=0.3), rigid(30, 0.1), rigid(40, 1),
+           rigid(30, 0, integral=30)]  # fmt: skip
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("axis", LEAPING, ids=range(len(LEAPING)))
+def test_24_leaps_change_neither_verdict_nor_swing_nor_period(axis):
+    """Of axes whose cycles repeat; where they wander over the counts, another last bit gives another window of them.
+
+    That a leap leaves the state of the samples that it leaps over is what test_system_standstill.py shows.
+    """
+    ensemble, hunting = METHODS["cascade"].standstill(axis.spec), 0
+    for one, other in zip(*(ensemble.courses(6, 1, on_counts=False) for _ in range(2)), strict=True):
+        other.watch.leaps = 0
+        leapt, slow = look(last_of(one)), look(last_of(other))
+        assert slow.outcome(ensemble.grain) == leapt.outcome(ensemble.grain)
+        if leapt.outcome(ensemble.grain) == "hunts" and leapt.swing.period <= 2.0:
+            hunting += one.leapt > 0.0
+            assert slow.swing.largest == near(leapt.swing.largest, 3e-2)
+            assert slow.swing.period == near(leapt.swing.period, 3e-2)
+    assert hunting > 0
+
+
+def last_of(course):
+    """What it does from 10 to 30 s after its start; nothing where rest was proven."""
+    rows = [course.go(0.5)]
+    while rows[-1][-1, 0] < 30.0 and not course.proven:
+        rows.append(course.go(0.5))
+    whole = np.concatenate(rows)
+    return whole[(whole[:, 0] > 10.0) & (whole[:, 0] <= 30.0)]
+
+
+STOPPED = [
+    (40, 0.1, 5, 4.4), (40, 1, 5, 5.5), (30, 0.1, 5, 1.2), (30, 0.1, 15, 1.2), (30, 0.1, 1, 5.5), (23, 0.1, 5, 0.7),
+]  # fmt: skip
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize(("static", "count", "integral", "error"), STOPPED)
+def test_25_half_the_swing_and_half_a_count_stop_it(static, count, integral, error):
+    axis, half = rigid(static, count, integral=integral), 0.5e-6 * count
+    swing = stands(axis).kinds[0].swing("motor")
+
+    def banded(width: float):
+        return stands(axis.replace({"method.dead_band": width}), 48)
+
+    stopped = banded(0.55 * swing + half)
+    assert not stopped.hunts, told(stopped)
+    # A slip that begins just outside the band D lands at D less the swing, at 2.7 um where the figure is 1.2 um.
+    least, moved = swing - 0.55 * swing, [abs(one.error) for one in stopped.found if one.moved]
+    assert max(moved) <= max(error * 1e-6, 1.05 * least) + half
+    if (static, count, integral) in ((40, 0.1, 5), (40, 1, 5), (30, 0.1, 1)):
+        assert banded(0.3 * swing).hunts
+    found = axis.hunt(dead_band=True)
+    assert found.band is not None
+    assert found.band.width is not None
+    assert 0.3 * swing < found.band.width <= 0.65 * swing + half
+    assert found.band.found.rest_error <= max(0.65 * swing + half, error * 1e-6 + half)
+
+
+@pytest.mark.wide
+def test_27_where_the_file_does_not_say_how_friction_falls_there_is_a_table():
+    friction = [f"mechanics.friction.{way}.coulomb=20 N" for way in ("positive", "negative")]
+    text = re.sub("(?m)^(static|stribeck) = .*\n", "", RIGID)
+    found = axis_of_text(text, (*friction, "drive.command_step=0 V", "encoder.resolution=0.1 um")).hunt()
+    outcomes = {(ratio, speed): one.outcome for ratio, speed, one in found.assumed}
+    assert len(outcomes) == 16
+    assert outcomes[1.0, 3e-3] in ("rests", "flickers")
+    assert outcomes[2.0, 0.0] == "hunts"
+    assert any("of 16 that may be" in one for one in found.told)

@@ -1,4 +1,4 @@
-"""`detent tune`: gains with margins."""
+"""`detent tune` and `detent hunt`: gains with margins, and whether the axis hunts at standstill."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +14,12 @@ GOAL = "stiff: the most integral stiffness; quiet: the least noise at the stiffn
 HOLD = "Leave this key as it is, as in method.velocity_gain; repeat for more."
 REPORT = "Write the report, one self-contained HTML file."
 WRITE = "Write the axis file with the gains; its text otherwise stays. It may be the file itself."
+STARTS = "How many starts; a third each are small, wide and hard."
+SEED = "What the starts are drawn from."
+ON_COUNTS = "Targets lie on counts of the encoder."
+BAND = "Find the least dead band of the integral that stops it."
+MAP = "Try dead bands and integrals beside one another, for the report."
+WRITE_BAND = "Write the axis file with the dead band; its text otherwise stays. It may be the file itself."
 
 
 @app.command()
@@ -67,5 +73,61 @@ def tune(
                     say(f"  {change}")
         if found.changes and write is None:
             say("--write FILE puts the new gains into an axis file")
+    if not found.done:
+        raise typer.Exit(NOT_DONE)
+
+
+@app.command()
+def hunt(
+    file: File,
+    overrides: Set = None,
+    starts: Annotated[int, option("--starts", "N", STARTS)] = 24,
+    seed: Annotated[int, option("--seed", "N", SEED, min=0)] = 1,
+    on_counts: Annotated[bool, option("--on-counts", "", ON_COUNTS)] = False,
+    dead_band: Annotated[bool, option("--dead-band", "", BAND)] = False,
+    map_it: Annotated[bool, option("--map", "", MAP)] = False,
+    write: Annotated[Path | None, option("--write", "FILE", WRITE_BAND)] = None,
+    report: Annotated[Path | None, option("--report", "FILE", REPORT)] = None,
+    *,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Watch the axis at standstill: whether it hunts, how far and how often, and what stops it.
+
+    Exit status: 0 rests from every start, 1 hunts, 2 wrong input.
+    """
+    from detent.axis import load
+    from detent.files.text import check_target
+
+    axis = load(file, overrides or [])
+    if write is not None:
+        is_own = write.exists() and file.exists() and write.samefile(file)
+        check_target(write, (".toml",), "an axis", force=force or is_own)
+    if report is not None:
+        check_target(report, (".html",), "a report", force=force)
+    with progress_bar(quiet=as_json) as progress:
+        found = axis.hunt(
+            starts=starts, seed=seed, on_counts=on_counts, dead_band=dead_band or write is not None, map_it=map_it,
+            progress=progress,
+        )  # fmt: skip
+        written = [found.save(write, force=force)] if write is not None and found.changes else []
+        if report is not None:
+            progress(0.97, "writing the report")
+            written.append(found.report(report, force=force))
+    if as_json:
+        changes = [one._asdict() for one in found.changes]
+        print_json(found.to_dict() | {"changes": changes, "files": [str(path) for path in written]})
+    else:
+        say(found.sentence, "bold green" if found.done else "bold yellow")
+        for one in found.told:
+            say(f"  {one}")
+        if found.rows:
+            print_table("", ("", "motor", "load", "every", "starts"), found.rows)
+        if found.assumed:
+            print_table(*found.table)
+        for path in written:
+            say(f"written: {path}")
+        for change in found.changes:
+            say(f"  {change}" + ("" if write is not None else "; --write FILE puts it into an axis file"))
     if not found.done:
         raise typer.Exit(NOT_DONE)

@@ -124,6 +124,10 @@ class Ensemble(Protocol):
     rule: Rule
     stated: bool
     """True where the file states static friction and Stribeck velocity, on which the answer depends."""
+    band: str
+    """Key of the dead band that stops hunting; empty where there is none."""
+    integral: str
+    """Key of the integral gain."""
 
     def courses(self, starts: int, seed: int, *, on_counts: bool) -> "Sequence[Course]":
         """The axis at its starts, each the same however many there are."""
@@ -131,4 +135,12 @@ class Ensemble(Protocol):
 
     def kind(self, swing: Swing) -> str:
         """What makes it hunt so, in a few words."""
+        ...
+
+    def assumed(self, ratio: float, stribeck: float) -> Any:
+        """The specification with another static friction, over Coulomb friction, and Stribeck velocity [m/s]."""
+        ...
+
+    def slips(self, errors: "NDArray[np.float64]") -> "NDArray[np.float64] | None":
+        """Error [m] at the standstill behind a slip that begins at each of these; None where it is no map of one."""
         ...

@@ -99,7 +99,8 @@ class Still:
 
 def stood(start="small", outcome=HUNTS, load=5e-6, period=1.0, error=1e-7):
     swing = Swing(motor=0.5 * load, load=load, period=period, command=0.1, held=0.9, limited=0.0)
-    return Stood(start=start, outcome=outcome, proven=True, swing=swing, error=error, simulated=1.0, leapt=0.0)
+    told = {"proven": True, "moved": True, "simulated": 1.0, "leapt": 0.0}
+    return Stood(start=start, outcome=outcome, swing=swing, error=error, **told)
 
 
 def test_kinds_are_told_apart_by_a_factor_of_three():

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.methods.cascade.build import build_cascade
+from detent.methods.cascade.checks import directions
 from detent.methods.cascade.derive import grain
 from detent.methods.cascade.loop import LinearLoop
 from detent.methods.cascade.schema import CascadeSpec
@@ -28,6 +29,8 @@ STARTS = "small", "wide", "hard"
 NEAR = 0.3  # share of the reach of small starts
 FORGOTTEN = 30.0  # time constants of a filter until it holds 1e-13 of what it held
 LEFT = 4  # samples between a leap and the one at which friction gives way
+SLIP = 0.5  # of a slip that is followed, at most [s]
+LOOSE = 1e-6  # of the force beyond what static friction holds, with which a slip begins
 HOUR = 3600.0  # of standing after which an axis rests [s]
 SLOW = 1e-6  # of a count in a sample: so slowly a mass without friction stands
 STEEP = 0.86  # largest slope of the falling friction, in (Fs - Fc)/vs: of 1 - exp(-x^2) at its steepest
@@ -88,6 +91,8 @@ class CascadeCourse:
 
 class CascadeEnsemble:
     """What `hunt` asks of a cascade axis."""
+
+    band = "method.dead_band"
 
     def __init__(self, spec: CascadeSpec) -> None:
         self.spec, self.unit, self.grain = spec, spec.unit("m"), grain(spec)
@@ -181,6 +186,41 @@ class CascadeEnsemble:
             drops = [(one.static - one.coulomb, one.stribeck) for one in sides if one.static > one.coulomb]
             found.append(sum(drop / speed if speed > 0.0 else math.inf for drop, speed in drops))
         return max(found)
+
+    @property
+    def integral(self) -> str:
+        """Key of the integral gain."""
+        return "method.integral" if self.spec.method.structure == "pid" else "method.velocity_integral"
+
+    def assumed(self, ratio: float, stribeck: float) -> CascadeSpec:
+        """The specification with another friction at standstill."""
+        values = dict[str, float]()
+        for key, table in directions(self.spec).items():
+            if table.coulomb > 0.0:
+                values |= {f"{key}.static": ratio * table.coulomb, f"{key}.stribeck": stribeck}
+        return self.spec.varied(values)
+
+    def slips(self, errors: Numbers) -> Numbers | None:
+        """Error behind a slip, of an axis without a gap that integrates and sticks."""
+        if self.gap > 0.0 or self.growth == 0.0 or not min(self._static) > 0.0:
+            return None
+        return np.array([self._slip(float(error)) for error in errors])
+
+    def _slip(self, error: float) -> float:
+        """Error at the standstill behind a slip that begins at an error [m]."""
+        course = CascadeCourse(self, 1, 0, on_counts=False)
+        c, force = course.state.controller, self.spec.effort_per_command
+        target = course.feed[0][0] = c.motor_sensor.position + error
+        loose = self.held[1] if error > 0.0 else self.held[0]
+        proportional = (self.stiffness - force * self.spec.method.velocity_integral) / force
+        if self.spec.method.structure == "pid":
+            proportional = self.stiffness / force
+        c.law.integral = loose * (1.0 + LOOSE) - proportional * error
+        rows = course.go(SLIP)
+        moved = np.flatnonzero(rows[:, 2] != rows[0, 1])
+        stuck = np.flatnonzero(rows[moved[0] :, 8] == 1.0) if len(moved) else moved
+        last = moved[0] + stuck[0] if len(stuck) else len(rows) - 1
+        return float(target - rows[last, 1])
 
     def kind(self, swing: Swing) -> str:
         """What makes it hunt so."""

@@ -1,0 +1,94 @@
+"""The least dead band that stops hunting, and what more of it and of the integral would do."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from detent.methods.method import untold
+from detent.methods.tuning import digits
+from detent.tune.standstill import Standstill, standstill
+
+SEEDS = 3  # of ensembles none of whose starts may hunt
+FINEST = 0.1  # of the swing, to which the width is sought
+WIDTHS = np.linspace(0.0, 1.5, 8)  # of the map, in swings
+INTEGRALS = (0.0, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0)  # of the map, times that of the file
+MAP_STARTS = 12
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """A dead band that was tried."""
+
+    width: float  # [m]
+    hunts: float  # share of the starts
+    swing: float  # largest [m]
+    rest_error: float  # largest of those that rest [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """The least dead band that stops an axis from every start of three seeds."""
+
+    width: float | None  # [m]; None where none does that is narrow enough
+    most: float  # widest that was tried [m]
+    tried: Sequence[Tried]
+
+    @property
+    def found(self) -> Tried | None:
+        """What the axis does with it."""
+        return next((one for one in self.tried if one.width == self.width), None)
+
+
+def least_band(spec: Any, found: Standstill, most: float, progress: Progress = untold) -> Band:
+    """Halve the interval between 0 and the swing, or the widest band allowed, until it is a tenth of the swing."""
+    key, starts = found.ensemble.band, len(found.found)
+    tried = list[Tried]()
+    low, high = 0.0, min(digits(found.swing + 0.5 * found.ensemble.grain, math.ceil), most)
+
+    def stops(width: float) -> bool:
+        progress(min(0.1 + 0.15 * len(tried), 0.95), f"dead band {len(tried) + 1}")
+        seen = list[Standstill]()
+        for seed in range(found.seed, found.seed + SEEDS):
+            seen.append(standstill(spec.varied({key: width}), starts, seed, on_counts=found.on_counts))
+            if seen[-1].hunts:
+                break
+        tried.append(
+            Tried(width, max(one.shares["hunts"] for one in seen), max(one.swing for one in seen),
+                  max(one.rest_error for one in seen))
+        )  # fmt: skip
+        return not seen[-1].hunts
+
+    if not stops(high):
+        return Band(None, high, tried)
+    while high - low > FINEST * found.swing:
+        middle = digits(0.5 * (low + high), math.ceil)
+        low, high = (low, middle) if stops(middle) else (middle, high)
+    return Band(high, high, sorted(tried, key=lambda one: one.width))
+
+
+@dataclass(frozen=True, slots=True)
+class Map:
+    """Verdicts over dead band and integral gain, rows of `found` by the integral."""
+
+    widths: Sequence[float]  # [m]
+    integrals: Sequence[float]  # times that of the file
+    found: Sequence[Sequence[Standstill]]
+
+
+def band_map(spec: Any, found: Standstill, integral: float, progress: Progress = untold) -> Map:
+    """Try every pair of dead band and integral from a few starts."""
+    keys, swing = found.ensemble, found.swing or found.ensemble.rule.swing or 4.0 * found.ensemble.grain
+    widths, rows = [float(share * swing) for share in WIDTHS], list[list[Standstill]]()
+    for share in INTEGRALS:
+        row = list[Standstill]()
+        for width in widths:
+            progress((len(rows) + len(row) / len(widths)) / len(INTEGRALS), f"map, {share:g} times the integral")
+            made = spec.varied({keys.band: width, keys.integral: share * integral})
+            row.append(standstill(made, MAP_STARTS, found.seed, on_counts=found.on_counts))
+        rows.append(row)
+    return Map(widths, INTEGRALS, rows)
