@@ -11,6 +11,10 @@ The command is limited, and the integral then does not wind up: it does not inte
 further beyond its limit (clamping). Back-calculation would need one more time constant, which
 nobody measures, and discharges an integral that holds a weight as soon as a fast move touches the limit.
 
+While the reference rests, the axis stands and its error is within a dead band, the integral stays as it is: friction
+and an integral would otherwise hunt. It is no dead band on the error, which would be an edge to oscillate at; all
+other parts of the command act on.
+
 Astrom, Hagglund: Advanced PID Control (2006), sections 3.3 (derivative filter), 3.5 (windup, conditional integration).
 Ellis: Control System Design Guide, 4th ed. (2012), chapters 6 (cascade of P and PI) and 8 (feedforward).
 """
@@ -60,6 +64,8 @@ class CascadeLawParams(Registers):
     pid: PidParams = block("position PID")
     feed_forward: FeedForwardParams = block("feedforward")
     max_command: f8 = register("limit of the command", unit="V")
+    dead_band: f8 = register("error up to which the integral of an axis at rest does not change; 0: none", unit="m")
+    standing: f8 = register("velocity below which a measured one is rest", unit="m/s")
 
 
 class CascadeReference(Registers):
@@ -111,21 +117,28 @@ def limit_command(p: CascadeLawParams, r: CascadeLaw, rest: float, increment: fl
 
 
 @step
-def control_cascade(p: CascadeLawParams, r: CascadeLaw, demand: float, velocity: float) -> None:
-    """Cascade: the velocity loop at a demand [m/s] and a measured velocity [m/s]."""
-    g = p.cascade
-    r.velocity_error = min(max(demand, -g.max_velocity), g.max_velocity) - velocity
-    rest = g.velocity_gain * r.velocity_error + r.feed_forward
-    limit_command(p, r, rest, g.integral_gain * p.period * r.velocity_error)
+def is_held(p: CascadeLawParams, r: CascadeLaw, ref: CascadeReference, velocity: float) -> bool:
+    """True while the integral of an axis at rest within its dead band is held."""
+    at_rest = ref.velocity == 0.0 and abs(velocity) < p.standing
+    return p.dead_band > 0.0 and at_rest and abs(r.position_error) <= p.dead_band
 
 
 @step
-def control_pid(p: CascadeLawParams, r: CascadeLaw, demand: float, velocity: float) -> None:
-    """Position PID; `demand` is the velocity that its derivative does not act against [m/s]."""
+def control_cascade(p: CascadeLawParams, r: CascadeLaw, demand: float, velocity: float, share: float) -> None:
+    """Cascade: the velocity loop at a demand [m/s] and a measured velocity [m/s]; the integral takes its `share`."""
+    g = p.cascade
+    r.velocity_error = min(max(demand, -g.max_velocity), g.max_velocity) - velocity
+    rest = g.velocity_gain * r.velocity_error + r.feed_forward
+    limit_command(p, r, rest, share * (g.integral_gain * p.period * r.velocity_error))
+
+
+@step
+def control_pid(p: CascadeLawParams, r: CascadeLaw, demand: float, velocity: float, share: float) -> None:
+    """Position PID; `demand` is the velocity that its derivative does not act against [m/s]; `share` as above."""
     g = p.pid
     r.velocity_error += g.smoothing * (demand - velocity - r.velocity_error)
     rest = g.proportional * r.position_error + g.derivative * r.velocity_error + r.feed_forward
-    limit_command(p, r, rest, g.integral * p.period * r.position_error)
+    limit_command(p, r, rest, share * (g.integral * p.period * r.position_error))
 
 
 @step
@@ -134,7 +147,8 @@ def control(p: CascadeLawParams, r: CascadeLaw, ref: CascadeReference, position:
     r.position_error = ref.position - position
     r.feed_forward = feed_forward(p.feed_forward, ref)
     fed = p.feed_forward.velocity * ref.velocity
+    share = 0.0 if is_held(p, r, ref, velocity) else 1.0
     if p.position_pid:
-        control_pid(p, r, fed, velocity)
+        control_pid(p, r, fed, velocity, share)
     else:
-        control_cascade(p, r, p.cascade.position_gain * r.position_error + fed, velocity)
+        control_cascade(p, r, p.cascade.position_gain * r.position_error + fed, velocity, share)

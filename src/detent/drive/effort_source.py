@@ -32,11 +32,17 @@ class EffortSource(Registers):
 
 
 @step
-def take_command(p: EffortSourceParams, r: EffortSource, command: float) -> None:
-    """Sample: take `command` [V], put out the one whose delay is over."""
+def converted(p: EffortSourceParams, command: float) -> float:
+    """The command on the steps of the converter and within the limit [V]."""
     if p.step > 0.0:
         command = p.step * math.floor(command / p.step + 0.5)
-    r.command = min(max(command, -p.limit), p.limit)
+    return min(max(command, -p.limit), p.limit)
+
+
+@step
+def take_command(p: EffortSourceParams, r: EffortSource, command: float) -> None:
+    """Sample: take `command` [V], put out the one whose delay is over."""
+    r.command = converted(p, command)
     r.place = (r.place + 1) % MEMORY
     r.memory[r.place] = r.command
     r.output = p.gain * r.memory[(r.place - p.delay) % MEMORY]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from detent.kernel.registers import Registers
     from detent.methods.linear import LinearModel
     from detent.methods.position import PositionSensor
-    from detent.methods.tuning import Tuning
+    from detent.methods.tuning import Ensemble, Tuning
     from detent.page.frame import Comparison, Page
     from detent.plant.injection import Place
     from detent.record.capture import Clocking
@@ -239,6 +239,8 @@ class Method(Protocol[SpecT]):
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
     tunes: ClassVar[str] = ""
     """Place of what chooses its gains: ``tuning(spec)`` gives a `tuning.Tuning`; none where it has no gains."""
+    stands: ClassVar[str] = ""
+    """Place of what watches it at standstill: ``ensemble(spec)`` gives a `tuning.Ensemble`; none where nothing does."""
     compares: ClassVar[tuple[str, ...]] = ()
     """Places of what holds it beside its alternatives: ``compare(spec, progress=)``."""
 
@@ -397,6 +399,15 @@ class Method(Protocol[SpecT]):
                 f"expected: a method with one; try: compare settings of this one with `detent run --set KEY=VALUE`"
             )
         return self.brought(self.tunes)(spec)
+
+    def standstill(self, spec: SpecT) -> "Ensemble":
+        """What watches it at standstill; refused where no loop holds it there."""
+        if not self.stands:
+            raise DetentError(
+                f"{spec.axis.name}: got an axis of the method {self.name}, which is not watched at standstill; "
+                "expected: a method that brings its starts, such as cascade; try: see how moves end with `detent run`"
+            )
+        return self.brought(self.stands)(spec)
 
     def sensors(self, spec: SpecT) -> "Mapping[str, PositionSensor]":
         """What counts the position of each of its motors; of a single one by the name ""."""

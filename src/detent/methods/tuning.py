@@ -1,9 +1,13 @@
-"""What a method brings to have its gains chosen: `tune` asks for the choice, and knows no method."""
+"""What a method brings to have its gains chosen and to be watched at standstill: `tune` and `hunt` know no method."""
 
 import math
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 DIGITS = 3  # of a gain that is chosen
 
@@ -79,3 +83,79 @@ def digits(value: float, how: Callable[[float], float] = round) -> float:
     power = DIGITS - 1 - math.floor(math.log10(value))
     scaled = how(round(value * 10.0**power, 6))
     return float(f"{scaled:.0f}e{-power}")
+
+
+# ---- standstill
+
+COLUMNS = (
+    "t", "motor_low", "motor_high", "load_low", "load_high", "error", "command", "integral", "held", "limited",
+)  # fmt: skip
+"""What a row says of a sample: when it ends [s], between which places both masses were in it [m], the error [m],
+command and integral [V], and two bits: friction held the motor, the command was at its limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A rule of thumb for the stick-slip of an integral against static friction."""
+
+    swing: float  # of the position, peak to peak [m]; 0 where there is none
+    period: float  # [s]; infinite without an integral
+    why: str  # which constant to change, in a sentence
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Swing:
+    """How an axis moves that does not come to rest, from one start."""
+
+    motor: float  # peak to peak [m]
+    load: float  # the same
+    period: float  # [s]; NaN where it does not repeat
+    command: float  # peak to peak [V]
+    held: float  # share of the time in which friction holds the motor
+    limited: float  # share of the samples with the command at its limit
+
+    @property
+    def largest(self) -> float:
+        """Of the mass that moves farther [m]."""
+        return max(self.motor, self.load)
+
+
+class Course(Protocol):
+    """An axis left to itself from one start."""
+
+    start: str
+    """Kind of the start: "small", "wide" or "hard"."""
+
+    @property
+    def proven(self) -> bool:
+        """True once nothing will ever change: it rests."""
+        ...
+
+    @property
+    def leapt(self) -> float:
+        """Time in which it stood and that was not simulated sample by sample [s]."""
+        ...
+
+    def go(self, seconds: float) -> "NDArray[np.float64]":
+        """Simulate so long, or until rest is proven: a row for each sample, shape (n, columns), as `COLUMNS` says."""
+        ...
+
+
+class Ensemble(Protocol):
+    """An axis at standstill, from many starts: what `hunt` asks of a method."""
+
+    unit: str
+    """Of positions."""
+    grain: float
+    """Travel per count of the position loop's encoder, or what stands for it [m]; half of it is called flicker."""
+    rule: Rule
+    stated: bool
+    """True where the file states static friction and Stribeck velocity, on which the answer depends."""
+
+    def courses(self, starts: int, seed: int, *, on_counts: bool) -> "Sequence[Course]":
+        """The axis at its starts, each the same however many there are."""
+        ...
+
+    def kind(self, swing: Swing) -> str:
+        """What makes it hunt so, in a few words."""
+        ...

@@ -156,3 +156,20 @@ def test_one_law_is_used_and_not_the_other():
     r = CascadeLaw()
     control(p, r, reference(1.0), 0.75, 0.125)
     assert r.command == 0.0
+
+
+@pytest.mark.parametrize("structure", [{"cascade__integral_gain": 5000.0}, {"position_pid": 1, "pid__integral": 4e4}])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_integral_of_an_axis_at_rest_holds_still_within_the_dead_band(structure, sign):
+    p, r = law(dead_band=1e-6, standing=1e-4, **structure), CascadeLaw(integral=0.25)
+    for error, velocity, speed, holds in (
+        (1e-6, 0.0, 0.0, True), (0.5e-6, 0.99e-4, 0.0, True), (0.0, -0.5e-4, 0.0, True),
+        (1.01e-6, 0.0, 0.0, False), (0.5e-6, 1e-4, 0.0, False), (0.5e-6, 0.0, 1e-9, False),
+    ):  # fmt: skip
+        before, r.velocity_error = r.integral, 0.0
+        control(p, r, reference(sign * error, sign * speed), 0.0, sign * velocity)
+        assert (r.integral == before) == holds
+        # Everything else acts as it would without a band.
+        free = CascadeLaw(integral=before)
+        control(law(**structure), free, reference(sign * error, sign * speed), 0.0, sign * velocity)
+        assert r.command - r.integral == pytest.approx(free.command - free.integral, rel=1e-12, abs=1e-15)

@@ -8,6 +8,7 @@ from detent.axisfile.tables import HomeTable
 from detent.control.cascade_law import CascadeLawParams
 from detent.control.homing import HomingParams
 from detent.methods.cascade.controller import CascadeControllerParams
+from detent.methods.cascade.derive import grain
 from detent.methods.cascade.loop import machine_of
 from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec
 from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count, smoothing
@@ -23,6 +24,7 @@ LAG = 1e-4  # share of the travel by which a commanded point ahead of an axis th
 CONTACT_TIME = 0.01  # for so long [s], or half as long as the guard would let it
 
 LONGEST_TICK = 1e-4  # longest tick [s]: a push begins, and a record is written, at whole ticks
+STANDING = 0.02  # counts in a sample below which a measured velocity, as filtered, is rest
 
 
 def build_cascade(spec: CascadeSpec) -> CascadeParams:
@@ -121,6 +123,8 @@ def _fill_limits(p: CascadeControllerParams, spec: CascadeSpec) -> None:
 def _fill_law(p: CascadeLawParams, spec: CascadeSpec) -> None:
     method, feed, shares = spec.method, p.feed_forward, spec.method.feed_forward
     p.position_pid, p.max_command = method.structure == "pid", spec.largest_command
+    count = spec.encoder_of("velocity").resolution or grain(spec)
+    p.dead_band, p.standing = method.dead_band, STANDING * count / method.sample_period
     p.cascade.position_gain, p.cascade.max_velocity = method.position_gain, method.velocity_limit
     p.cascade.velocity_gain, p.cascade.integral_gain = method.velocity_gain, method.velocity_integral
     p.pid.proportional, p.pid.integral, p.pid.derivative = method.proportional, method.integral, method.derivative

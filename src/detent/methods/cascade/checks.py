@@ -119,10 +119,8 @@ def _places(spec: CascadeSpec) -> Iterator[Contradiction]:
     start, low, high, unit = spec.mechanics.start_position, spec.limits.lowest, spec.highest, spec.unit("m")
     yield from common.static_friction(directions(spec), spec.unit("N"))
     if not low <= start <= high:
-        key, allowed = (
-            "mechanics.start_position",
-            f"from {text(low, unit)} to {text(high, unit)}, the travel of the axis",
-        )
+        key = "mechanics.start_position"
+        allowed = f"from {text(low, unit)} to {text(high, unit)}, the travel of the axis"
         nearest = put(key, f'"{low if start < low else high!r} {unit}"')
         yield wrong(f"{key} limits.travel limits.lowest", allowed, nearest)
 
@@ -207,6 +205,10 @@ def _supervision(spec: CascadeSpec) -> Iterator[Contradiction]:
         key, allowed = "method.following_error", f"above method.in_position, {text(method.in_position, spec.unit('m'))}"
         more = remedy.least(key, method.in_position * (1 + 1e-3))
         yield wrong(f"{key} method.in_position limits.travel encoder.resolution", allowed, more)
+    if method.dead_band > method.in_position:
+        allowed = f"up to method.in_position, {text(method.in_position, spec.unit('m'))}: it may rest anywhere inside"
+        less = remedy.most("method.dead_band", method.in_position)
+        yield wrong("method.dead_band method.in_position", allowed, less)
     yield from common.end_of_move(remedy, method.timeout, method.in_position_time, method.sample_period)
 
 

@@ -38,6 +38,11 @@ def dead_time(spec: CascadeSpec) -> float:
     return samples * spec.method.sample_period + table.velocity_filter
 
 
+def grain(spec: CascadeSpec) -> float:
+    """A count of the position loop's encoder; of an ideal one a fiftieth of the in-position window [m]."""
+    return spec.encoder_of("position").resolution or 0.02 * spec.method.in_position
+
+
 class CascadeFigures:
     """The machine behind a specification, with the model of its loops."""
 

@@ -238,6 +238,10 @@ class MethodTable(Table, frozen=True):
         derived="1e-4 x limits.travel, but at least 2 encoder counts", gt=0.0, le=1e5,
     )  # fmt: skip
     in_position_time: Time = optional("time in the window until the axis is in position", 50e-3, gt=0.0, le=10.0)
+    dead_band: Length = optional(
+        "position error up to which the integral holds still while the axis stands, against hunting; 0: none",
+        0.0, ge=0.0, le=1e5,
+    )  # fmt: skip
     timeout: Time = optional(
         "time allowed after the end of the reference until in position; then the move has failed",
         2.0,

@@ -102,6 +102,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "method.integral": ("10 kV/(m*s)", PID),
     "method.derivative": ("90 V*s/m", PID),
     "method.derivative_filter": ("1 ms", PID),
+    "method.dead_band": ("20 um", ()),
     "method.feedback.position": ("load", ("load_encoder.resolution=2 um",)),
     "method.feedback.velocity": ("load", ("load_encoder.resolution=2 um",)),
     "method.feed_forward.velocity": ("0.5", ()),

@@ -33,6 +33,7 @@ METHOD = [
     given("PID without gains", "method.structure=pid", key="method.structure"),
     given("velocity limit", "method.velocity_limit=0.4 m/s", key="method.velocity_limit"),
     given("following error", "method.following_error=10 um", key="method.following_error"),
+    given("dead band", "method.dead_band=60 um", key="method.dead_band"),
     given("timeout", "method.timeout=20 ms", key="method.timeout"),
     given("long time in position", "method.in_position_time=3 s", key="method.in_position_time"),
     given("converter", "drive.command_step=5 V", key="drive.command_step"),
