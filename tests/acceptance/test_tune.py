@@ -351,7 +351,12 @@ def test_an_unstable_axis_is_told_refused_a_green_verdict_and_mended():
     assert not told.before.settles
     assert told.before.result.level != "good"
     before = {name: text for name, text, _ in told.rows}
-    assert before["Ms at command"] == before["phase margin at velocity"] == "none: it does not settle"
+    assert (
+        before["Ms at command"]
+        == before["phase margin at velocity"]
+        == before["standstill"]
+        == "none: it does not settle"
+    )
     mended = unstable.replace(told.values)
     assert mended.check().warnings == ()
     assert mended.run(detent.example("slide_moves.toml"), every=0).result.level == "good"

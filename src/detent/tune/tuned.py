@@ -88,7 +88,13 @@ class Tuned(OnScreen):
                 f"What [tolerance] leaves open costs {100 - share:.0f} % of it; {number} other "
                 f"plant{'s' if number != 1 else ''} decided, and {self.guaranteed.fresh} random ones kept the bounds."
             )
-        return told + [one.why for one in self.shares]
+        told += [one.why for one in self.shares]
+        if self.after is not None and self.after.stood is not None and self.after.stood.hunts:
+            remedy = "a dead band of half of that and half a count stops such motion"
+            told.append(f"At standstill it {self.after.at_rest}: {remedy}.")
+            if not self.after.stood.ensemble.stated:
+                told.append("That depends on static friction and Stribeck velocity, which the file does not state.")
+        return told
 
     @cached_property
     def trade(self) -> list[tuple[float, float]]:
@@ -222,6 +228,7 @@ class Tuned(OnScreen):
                        for cut, m in one.margins.items()}  # fmt: skip
             return {
                 "margins": margins, "settles": one.settles, "bandwidth": one.bandwidth, "run": one.result.to_dict(),
+                "standstill": {"shares": dict(one.stood.shares), "swing": one.stood.swing} if one.stood else None,
                 "warnings": [str(caution) for caution in one.cautions],
             }  # fmt: skip
 
