@@ -417,6 +417,13 @@ def test_28_check_cautions_the_gains_by_hand_and_not_those_of_tune():
     found = by_hand_too.tune().values
     stated = CascadeTuning(detent.load(CASCADE).spec).stated
     assert found == stated  # the packaged example has the gains of tune, all three digits
+    loose = [*BY_HAND, "mechanics.coupling.backlash=100 um", "method.feedback.position=load",
+             "load_encoder.resolution=1 um", "method.velocity_integral=0 V/m",
+             *both(coulomb="0 N", static="0 N"), *both("load_friction", coulomb="0 N", static="0 N")]  # fmt: skip
+    gap = "backlash in the position loop"
+    assert gap in {one.name for one in detent.load(CASCADE, loose).check().warnings}
+    held = detent.load(CASCADE, [*loose, *both(coulomb="20 N", static="20 N")])
+    assert gap not in {one.name for one in held.check().warnings}
 
 
 # ---- hunting
