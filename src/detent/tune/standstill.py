@@ -140,25 +140,9 @@ def standstill(  # noqa: PLR0913 - what may be asked
     spec: Any, starts: int = 24, seed: int = 1, *, on_counts: bool = False, longest: float = LONGEST,
     progress: Any = untold,
 ) -> Standstill:  # fmt: skip
-    """Watch an axis at standstill from many starts, on as many threads as there are processors.
+    """Watch an axis at standstill, on as many threads as there are processors; parameters as of `Axis.hunt`.
 
-    Parameters
-    ----------
-    spec : AxisSpec
-        The axis.
-    starts : int
-        How many; a third each are small, wide and hard. The first ones are the same however many there are.
-    seed : int
-        What they are drawn from.
-    on_counts : bool
-        Targets lie on counts of the encoder.
-    longest : float
-        Time that is simulated of each start at most [s]; standing that is leapt over does not count.
-
-    Raises
-    ------
-    DetentError
-        The method is not watched at standstill.
+    Of each start at most `longest` [s] are simulated; standing that is leapt over does not count.
     """
     ensemble = METHODS[spec.axis.method].standstill(spec)
     courses = ensemble.courses(starts, seed, on_counts=on_counts)
