@@ -277,7 +277,7 @@ class Axis(OnScreen):
         >>> import detent
         >>> model = detent.load(detent.example("cascade.toml")).linear()
         >>> round(model.margins["velocity"].crossover, 1), round(model.margins["command"].sensitivity, 2)
-        (45.3, 2.22)
+        (30.2, 1.7)
         >>> model["position"].closed().to_scipy().dt
         0.00025
         """
@@ -304,7 +304,8 @@ class Axis(OnScreen):
             Largest peak of the reference to the position without feedforward, 1 to 2.
         goal : str
             "stiff": as much integral stiffness as the bounds allow; "quiet": as little noise as the stiffness of the
-            file's gains takes. Default: the first that the method has.
+            file's gains takes; "quick": of gains between both, those with which the job settles first. Default: the
+            first that the method has.
         hold : sequence of str
             Keys that stay as they are.
         job : path or job object, optional

@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
+from tests.identify_files import write_log
 from tests.standstill_rig import both, example, rigid, told
 from tests.tolerance_rig import QUESTION, fill, fill_killed
 from tests.standstill_rig import RIGID, both, drawn, example, rigid, told
+from typer.testing import CliRunner
 
 import detent
 from detent.analysis.sampled_loop import SampledLoop
 from detent.analysis.sensitivity import clopper_pearson, sensitivity
 from detent.axis import Axis
+from detent.cli.app import app
 from detent.errors import InputError
 from detent.files.source import parse_source
 from detent.methods.cascade.loop import LinearLoop
@@ -344,6 +347,70 @@ def moved_and_pushed(gains) -> tuple[float, float, float, float]:
     return off[:end].max(), off[end:].max(), np.abs(way - way[0]).max(), back
 
 
+@pytest.mark.compiled
+def test_an_unstable_axis_is_told_refused_a_green_verdict_and_mended():
+    unstable = detent.load(CASCADE, ["method.velocity_gain=3000 V*s/m"])
+    assert unstable.check().warnings[0].name == "stability of the loops"
+    assert unstable.run(detent.example("slide_moves.toml"), every=0).result.level != "good"
+    told = unstable.tune()
+    assert told.done
+    assert not told.before.settles
+    assert told.before.result.level != "good"
+    before = {name: text for name, text, _ in told.rows}
+    assert (
+        before["Ms at command"]
+        == before["phase margin at velocity"]
+        == before["standstill"]
+        == "none: it does not settle"
+    )
+    mended = unstable.replace(told.values)
+    assert mended.check().warnings == ()
+    assert mended.run(detent.example("slide_moves.toml"), every=0).result.level == "good"
+
+
+@pytest.mark.compiled
+def test_three_commands_lead_from_a_recording_to_gains(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_log(tmp_path / "log.csv")
+    (tmp_path / "moves.csv").write_text("by [mm],dwell [ms]\n20,200\n-15,200\n", encoding="utf-8")
+    answers = [
+        CliRunner().invoke(app, words)
+        for words in (
+            ["identify", "log.csv", "--write", "slide.toml"],
+            ["tune", "slide.toml", "--write", "slide.toml"],
+            ["run", "slide.toml", "--job", "moves.csv", "--every", "0", "--json"],
+        )
+    ]
+    assert [one.exit_code for one in answers] == [0, 0, 0], [one.output for one in answers]
+    assert json.loads(answers[2].stdout)["level"] == "green"
+    assert "# tuned" in (tmp_path / "slide.toml").read_text(encoding="utf-8")
+    spec = detent.load(tmp_path / "slide.toml").spec
+    assert (spec.method.feed_forward.acceleration, spec.method.feed_forward.viscous) == (1.0, 1.0)
+
+
+@pytest.mark.wide
+def test_gains_that_are_quick_settle_first_of_all():
+    axis = detent.load(CASCADE, ["method.in_position=1.5 um"])
+    slowest = {}
+    for goal in ("stiff", "quiet", "quick"):
+        told = axis.tune(goal=goal)
+        assert told.after is not None
+        slowest[goal] = max(move.settling for move in told.after.result.moves)
+    assert slowest["quick"] <= min(slowest.values())
+
+
+def test_feedforward_takes_what_is_known_of_its_constants():
+    tuning = CascadeTuning(detent.load(CASCADE).spec)
+    stated = {f"mechanics.friction.{way}.{name}" for way in ("positive", "negative") for name in ("viscous", "coulomb")}
+    known = {"mechanics.friction.positive.coulomb": 0.25, "mechanics.friction.negative.coulomb": 0.1}
+    shares = {one.key.rpartition(".")[2]: one.value for one in tuning.shares(stated, known)}
+    assert shares == {"velocity": 1.0, "acceleration": 1.0, "viscous": 1.0, "coulomb": 0.75}
+    shares = {one.key.rpartition(".")[2]: one.value for one in tuning.shares(set(), {})}
+    assert shares == {"velocity": 1.0, "acceleration": 1.0, "viscous": 0.0, "coulomb": 0.0}
+    hanging = CascadeTuning(detent.load(CASCADE, ["mechanics.weight=20 N"]).spec)
+    assert next(one for one in hanging.shares(stated, {}) if one.key.endswith("weight")).value == 1.0
+
+
 # ---- check
 
 
@@ -356,6 +423,13 @@ def test_28_check_cautions_the_gains_by_hand_and_not_those_of_tune():
     found = by_hand_too.tune().values
     stated = CascadeTuning(detent.load(CASCADE).spec).stated
     assert found == stated  # the packaged example has the gains of tune, all three digits
+    loose = [*BY_HAND, "mechanics.coupling.backlash=100 um", "method.feedback.position=load",
+             "load_encoder.resolution=1 um", "method.velocity_integral=0 V/m",
+             *both(coulomb="0 N", static="0 N"), *both("load_friction", coulomb="0 N", static="0 N")]  # fmt: skip
+    gap = "backlash in the position loop"
+    assert gap in {one.name for one in detent.load(CASCADE, loose).check().warnings}
+    held = detent.load(CASCADE, [*loose, *both(coulomb="20 N", static="20 N")])
+    assert gap not in {one.name for one in held.check().warnings}
 
 
 # ---- hunting
@@ -371,7 +445,7 @@ def test_26_a_dead_band_changes_nothing_while_the_axis_moves_or_is_outside(struc
     """That a band of 0 leaves every bit is what tests/acceptance/test_golden_bits.py shows."""
     names = ["controller.law.position_error", "controller.reference.velocity", "controller.motor_sensor.velocity",
              "controller.law.integral", "plant.machine.motor.position"]  # fmt: skip
-    axes = [detent.load(CASCADE, [*structure, f"method.dead_band={band} um"]) for band in (0, 2)]
+    axes = [detent.load(CASCADE, [*BY_HAND, *structure, f"method.dead_band={band} um"]) for band in (0, 2)]
     free, banded = (axis.run(one_move("there", 0.05, 0.5), signals=names).trace for axis in axes)
     error, asked, speed, integral, _ = (np.array(banded[name]) for name in names)
     held = (asked == 0.0) & (np.abs(speed) < 0.02 * 1e-6 / 0.25e-3) & (np.abs(error) <= 2e-6)

@@ -10,7 +10,10 @@ from detent.cli.terminal import print_json, print_table, progress_bar, say, spli
 
 MS = "Largest sensitivity peak, 1.2 to 2.5; 1.7 leaves a gain margin of 2.4 and 34 degrees of phase."
 OVERSHOOT = "Largest peak of the reference to the position without feedforward, at least 1."
-GOAL = "stiff: the most integral stiffness; quiet: the least noise at the stiffness of the file."
+GOAL = (
+    "stiff: the most integral stiffness; quiet: the least noise at the stiffness of the file; quick: of both, what "
+    "settles first with the job."
+)
 HOLD = "Leave this key as it is, as in method.velocity_gain; repeat for more."
 REPORT = "Write the report, one self-contained HTML file."
 WRITE = "Write the axis file with the gains; its text otherwise stays. It may be the file itself."
@@ -66,6 +69,8 @@ def tune(
         for one in found.refusals:
             say(f"  {one}", "yellow", wrong=True)
         print_table("", ("", "before", "after"), found.rows)
+        for told in found.why:
+            say(f"  {told}")
         for path in written:
             say(f"written: {path}")
             if path == write:

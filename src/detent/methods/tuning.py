@@ -1,7 +1,7 @@
 """What a method brings to have its gains chosen and to be watched at standstill: `tune` and `hunt` know no method."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -20,8 +20,20 @@ class Bounds:
     overshoot: float = 1.1  # largest magnitude of the reference to the position, without feedforward
 
 
+@dataclass(frozen=True, slots=True)
+class Share:
+    """A share of feedforward that follows from how well the constant behind it is known."""
+
+    key: str
+    value: float
+    why: str  # in a sentence
+
+
 class Tuning(Protocol):
-    """The choice of the gains of one axis over a set of plants: specifications that differ in what is not known."""
+    """The choice of the gains of one axis over a set of plants: specifications that differ in what is not known.
+
+    What a class derived from it leaves out has the default that stands here.
+    """
 
     keys: tuple[str, ...]
     """Keys of the file that it chooses."""
@@ -45,6 +57,21 @@ class Tuning(Protocol):
     def worth(self, values: Mapping[str, float]) -> float:
         """What is made as large as the bounds allow."""
         ...
+
+    def front(self, plants: Sequence[Any], bounds: Bounds, held: Mapping[str, float]) -> "list[dict[str, float]]":
+        """Values from the stiffest to quieter ones, of which the goal "quick" tries each; none without that goal."""
+        del plants, bounds, held
+        return []
+
+    def settling(self, result: Any) -> float:
+        """How long the slowest move of a run took to settle [s]; infinite where one did not."""
+        del result
+        return math.inf
+
+    def shares(self, stated: Container[str], known: Mapping[str, float]) -> Sequence[Share]:
+        """Shares of feedforward, by the keys that are stated and the relative uncertainty of those that have one."""
+        del stated, known
+        return ()
 
 
 def digits(value: float, how: Callable[[float], float] = round) -> float:

@@ -38,6 +38,7 @@ class RunRecord(OnScreen, Generic[JobT]):
     warnings: list[str] = field(default_factory=list[str])
     time_ready: float = 0.0  # the axis takes commands, and the job begins
     time_end: float = 0.0
+    limited_share: float = 0.0  # of all looks of its guard, those with the command at its limit
 
     told: ClassVar[tuple[str, ...]] = ()
     """Names of the figures that `to_dict` gives beside these."""
@@ -116,6 +117,11 @@ class Evidence:
         elif seen.limited > MOST_LIMITED_AT_REST * seen.looks and not self.worst:
             limited = format_quantity(seen.limited * self.look, "s", 3)
             self.worst = f"at rest {whose} the command was at its limit for {limited} of {spent}"
+
+    @property
+    def limited_share(self) -> float:
+        """Share of all looks with the command at its limit; 0 without a guard."""
+        return self.limited / self.looks if self.looks else 0.0
 
     def take_error(self, whose: str, error: float) -> None:
         """An error at the end of a move [unit]."""

@@ -4,6 +4,7 @@ As robust tuners do (Apkarian, Gahinet, Buhr 2014: "Multi-model, multi-objective
 controllers"), with a look at plants that the choice has not seen at the end.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -43,10 +44,16 @@ class Chooser:
     goal: str = "stiff"
     held: Mapping[str, float] = field(default_factory=dict[str, float])
     progress: Progress = untold
+    settle: Callable[[Mapping[str, float]], float] = field(default=lambda _: math.inf, compare=False)
+    """How long the job takes to settle with some gains [s], for the goal "quick"."""
 
     def choose(self, variants: Sequence[Variant]) -> dict[str, float]:
-        """The best gains for these plants; empty for none."""
-        return self.tuning.choose([one.spec for one in variants], self.bounds, self.goal, self.held)
+        """The best gains for these plants; empty for none. Of two that are as quick, the stiffer."""
+        plants = [one.spec for one in variants]
+        if self.goal != "quick":
+            return self.tuning.choose(plants, self.bounds, self.goal, self.held)
+        front = self.tuning.front(plants, self.bounds, self.held)
+        return min(front, key=lambda one: (self.settle(one), -self.tuning.worth(one)), default=dict[str, float]())
 
     def worst(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[float]:
         """By how much each plant exceeds the worst of its bounds."""

@@ -51,10 +51,10 @@ def _cards(found: "Tuned") -> list[Card]:
     """Ms, and what it bought."""
     if found.after is None:
         return []
-    (old, _), (new, at) = found.before.sensitivity, found.after.sensitivity
+    new, at = found.after.sensitivity
     gained = (found.worth[2] if found.done else found.worth[1]) / found.worth[0] if found.worth[0] else 0.0
     cards = [
-        Card("Ms", number(new), "", f"at {format_quantity(at, 'Hz', 3)}; {number(old)} before"),
+        Card("Ms", number(new), "", f"at {format_quantity(at, 'Hz', 3)}; before: {found.before.told}"),
         Card(found.worth_text, number(gained), "times", "that of the gains in the file"),
     ]
     if found.after.bandwidth is not None and found.before.bandwidth is not None:

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
-from detent.analysis.linear_system import Margins
 from detent.axisfile.tables import AxisSpec
+from detent.axisfile.tolerance import Tolerance
 from detent.errors import DetentError
 from detent.files.fields import held_leaves, type_of, unit_of
 from detent.files.findings import Caution
@@ -16,58 +16,25 @@ from detent.files.patch import Change, NewValue, patch
 from detent.files.problems import dotted, format_value
 from detent.files.screen import Block, OnScreen, Screen
 from detent.files.text import check_target, did_you_mean, write_text
-from detent.methods.check import check_spec
 from detent.methods.load import AxisFile
 from detent.methods.method import untold
 from detent.methods.registry import METHODS
-from detent.methods.tuning import Bounds
-from detent.tune.choice import FEWEST, Chooser, Guaranteed, Progress
+from detent.methods.tuning import Bounds, Share
+from detent.tune.choice import FEWEST, Chooser, Guaranteed, Progress, value_of
 from detent.tune.plants import Plants
-from detent.units import format_quantity
+from detent.tune.stand import Stand
 
 SAME = 1e-12  # of a gain, as a share
 TRADED = (1.3, 1.4, 1.5, 1.6, 1.7, 1.85, 2.0, 2.2)  # values of Ms of which a report tells what they would give
+MOST_LIMITED = 0.05  # share of the job with the command at its limit
+SATURATED = "reserve"  # what is refused then
+GOALS = {
+    "stiff": "The largest {0} with {1}.",
+    "quiet": "The least noise with {1}, at the {0} of the file.",
+    "quick": "Of five pairs of {0} and noise with {1}, the one that settled first.",
+}
+"""Why these, by what was asked for."""
 RANKED = 2  # intervals of which is told what they would be worth
-
-
-@dataclass(frozen=True)
-class Stand:
-    """An axis with some gains: its margins by the cut, what it does with the job, and what `check` says."""
-
-    file: AxisFile
-    margins: Mapping[str, Margins]
-    settles: bool
-    bandwidth: float | None  # of the reference to the position [Hz]
-    result: Any
-    summary: Sequence[tuple[str, str]]
-    cautions: Sequence[Caution]
-
-    @classmethod
-    def of(cls, file: AxisFile, job: Any) -> "Stand":
-        """Try a job on an axis."""
-        spec = file.spec
-        method = METHODS[spec.axis.method]
-        model, result = method.linear(spec), method.run(spec, job)
-        outer = [cut for cut in model.loops if "position" in cut]
-        bandwidth = model[outer[0]].closed().bandwidth if outer and model.settles else None
-        summary = method.summary(spec, result)
-        return cls(file, model.margins, model.settles, bandwidth, result, summary, check_spec(file).warnings)
-
-    @property
-    def sensitivity(self) -> tuple[float, float]:
-        """Largest Ms of all cuts, and its frequency [Hz]."""
-        worst = max(self.margins.values(), key=lambda one: one.sensitivity)
-        return worst.sensitivity, worst.peak
-
-    def rows(self) -> Iterator[tuple[str, str]]:
-        """Figures to be laid beside those of other gains."""
-        for cut, one in self.margins.items():
-            yield f"Ms at {cut}", f"{one.sensitivity:.3g} at {format_quantity(one.peak, 'Hz', 3)}"
-            yield f"phase margin at {cut}", format_quantity(one.phase, "rad", 3)
-            yield f"gain margin at {cut}", f"{one.gain:.3g}" if math.isfinite(one.gain) else "any"
-        if self.bandwidth is not None:
-            yield "bandwidth, -3 dB", format_quantity(self.bandwidth, "Hz", 3)
-        yield from ((name, text.partition(", from ")[0]) for name, text in self.summary)
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,6 +53,8 @@ class Tuned(OnScreen):
         For which plants the gains hold.
     refusals : sequence of Caution
         Why there are none, or why they hold for the nominal axis only.
+    shares : sequence of Share
+        Shares of feedforward, each with its reason.
     """
 
     before: Stand
@@ -97,6 +66,7 @@ class Tuned(OnScreen):
     worth_text: str
     guaranteed: Guaranteed
     refusals: Sequence[Caution]
+    shares: Sequence[Share]
     chooser: Chooser = field(compare=False)
 
     @property
@@ -110,7 +80,7 @@ class Tuned(OnScreen):
         if not self.values:
             return []
         bounds = f"Ms up to {self.bounds.sensitivity:g} at every cut and an overshoot up to {self.bounds.overshoot:g}"
-        told = [f"The largest {self.worth_text} with {bounds}."]
+        told = [GOALS[self.goal].format(self.worth_text, bounds)]
         if self.done and self.before.file.tolerance:
             share = 100 * self.worth[2] / self.worth[1]
             number = len(self.guaranteed.binding) - 1
@@ -118,6 +88,12 @@ class Tuned(OnScreen):
                 f"What [tolerance] leaves open costs {100 - share:.0f} % of it; {number} other "
                 f"plant{'s' if number != 1 else ''} decided, and {self.guaranteed.fresh} random ones kept the bounds."
             )
+        told += [one.why for one in self.shares]
+        if self.after is not None and self.after.stood is not None and self.after.stood.hunts:
+            remedy = "a dead band of half of that and half a count stops such motion"
+            told.append(f"At standstill it {self.after.at_rest}: {remedy}.")
+            if not self.after.stood.ensemble.stated:
+                told.append("That depends on static friction and Stribeck velocity, which the file does not state.")
         return told
 
     @cached_property
@@ -168,8 +144,9 @@ class Tuned(OnScreen):
         name = file.spec.axis.name
         if self.after is None:
             return f"{name}: no gains keep Ms {bounds.sensitivity:g}."
-        level, peak = self.after.sensitivity
-        told = f"Ms {level:.3g} at {format_quantity(peak, 'Hz', 3)}"
+        told = f"Ms {self.after.told}"
+        if any(one.name == SATURATED for one in self.refusals):
+            return f"{name}: gains found, {told}, but the job is not done with a reserve."
         if self.refusals:
             return f"{name}: gains for the axis as its file states it only, {told}; not for all that it may be."
         seen = f", guaranteed over [tolerance] ({len(file.tolerance)} keys)" if file.tolerance else ""
@@ -190,14 +167,11 @@ class Tuned(OnScreen):
 
     def _new_values(self) -> list[NewValue]:
         units = {dotted(path): unit_of(field) for path, field, _ in held_leaves(self.before.file.spec)}
-        level, peak = (self.after or self.before).sensitivity
-        old, at = self.before.sensitivity
-        note = (
-            f"Ms {level:.3g} at {format_quantity(peak, 'Hz', 3)} ({old:.3g} at {format_quantity(at, 'Hz', 3)} before)"
-        )
+        note = f"Ms {(self.after or self.before).told} ({self.before.told} before)"
         if self.before.file.tolerance and self.done:
             note += f", guaranteed {self.bounds.sensitivity:g} over [tolerance]"
-        return [NewValue(key, value, units[key], note, "tuned") for key, value in self.values.items()]
+        why = {one.key: one.why.partition(": ")[2].rstrip(".") for one in self.shares}
+        return [NewValue(key, value, units[key], why.get(key, note), "tuned") for key, value in self.values.items()]
 
     def save(self, path: str | Path, *, force: bool = False) -> Path:
         """Write the axis file with the gains; all else of its text stays.
@@ -255,6 +229,7 @@ class Tuned(OnScreen):
                        for cut, m in one.margins.items()}  # fmt: skip
             return {
                 "margins": margins, "settles": one.settles, "bandwidth": one.bandwidth, "run": one.result.to_dict(),
+                "standstill": {"shares": dict(one.stood.shares), "swing": one.stood.swing} if one.stood else None,
                 "warnings": [str(caution) for caution in one.cautions],
             }  # fmt: skip
 
@@ -265,6 +240,7 @@ class Tuned(OnScreen):
             "worth": {"before": nominal[0], "nominal": nominal[1], "guaranteed": nominal[2]},
             "binding": [dict(one.values) for one in self.guaranteed.binding], "worst": self.guaranteed.worst,
             "fresh": self.guaranteed.fresh, "refusals": [vars_of(one) for one in self.refusals],
+            "shares": {one.key: one.why for one in self.shares},
             "before": stand(self.before), "after": stand(self.after),
         }  # fmt: skip
 
@@ -283,21 +259,52 @@ def tune(  # noqa: PLR0913 - what may be asked
     spec = file.spec
     method = METHODS[spec.axis.method]
     tuning, bounds = method.tuning(spec), _bounds(sensitivity, overshoot)
+    job = method.trial_job(spec) if job is None else job
+    shares = tuning.shares(file.origins, {key: _unsure(spec, key, one) for key, one in file.tolerance.items()})
+    held = _held(hold, tuning, [one.key for one in shares])
+    fed = {one.key: one.value for one in shares if one.key not in hold and one.value != value_of(spec, one.key)}
+
+    @cache
+    def settle(values: tuple[tuple[str, float], ...]) -> float:
+        return tuning.settling(method.run(spec.varied(fed | dict(values)), job))
+
     chooser = Chooser(
-        tuning, Plants(spec, file.tolerance), bounds, _goal(goal, tuning.goals), _held(hold, tuning), progress,
+        tuning, Plants(spec, file.tolerance), bounds, _goal(goal, tuning.goals), held, progress,
+        lambda values: settle(tuple(values.items())),
     )  # fmt: skip
     nominal = chooser.nominal()
     found = chooser.guaranteed() if file.tolerance and nominal.values else nominal
     worth = tuning.worth(tuning.stated), chooser.worth(nominal), chooser.worth(found)
     refusals = [*_unknown(file), *_refusals(chooser, nominal, found)]
     values = (nominal if refusals else found).values
-    job = method.trial_job(spec) if job is None else job
+    chosen = dict(values) | fed if values else {}
     progress(0.85, "trying the gains of the file")
     before = Stand.of(file, job)
     progress(0.92, "trying the new gains")
-    after = Stand.of(file.replaced(_typed(spec, values)), job) if values else None
-    chosen = dict(values)
-    return Tuned(before, after, bounds, chooser.goal, chosen, worth, tuning.worth_text, found, refusals, chooser)
+    after = Stand.of(file.replaced(_typed(spec, chosen)), job) if values else None
+    if after is not None and not refusals:
+        others = (method.run(one.spec.varied(chosen), job) for one in found.binding[1:])
+        refusals = list(_saturated([after.result, *others]))
+    kept = [one for one in shares if one.key not in hold]
+    return Tuned(before, after, bounds, chooser.goal, chosen, worth, tuning.worth_text, found, refusals, kept, chooser)
+
+
+def _unsure(spec: AxisSpec, key: str, one: Tolerance) -> float:
+    """Half of what is left open of a key, as a share of its value."""
+    return 0.5 * (one.high - one.low) / max(abs(value_of(spec, key)), 1e-300)
+
+
+def _saturated(results: Sequence[Any]) -> Iterator[Caution]:
+    """The job leaves no reserve, on the axis of the file or on a plant that decides."""
+    number, worst = max(enumerate(results, 1), key=lambda pair: (not pair[1].done, pair[1].limited_share))
+    whose = "the axis of the file" if number == 1 else f"plant {number} that decides"
+    remedy = "lower limits.acceleration, or give a gentler --job"
+    if not worst.done:
+        yield Caution(SATURATED, f"the job fails on {whose}", "a job that is done", worst.failure, remedy)
+    elif worst.limited_share > MOST_LIMITED:
+        value = f"the command is at its limit for {100 * worst.limited_share:.2g} % of the job on {whose}"
+        consequence = "there the loops are open, and no margin holds"
+        yield Caution(SATURATED, value, f"up to {100 * MOST_LIMITED:g} %", consequence, remedy)
 
 
 def _bounds(sensitivity: float, overshoot: float) -> Bounds:
@@ -316,13 +323,13 @@ def _goal(goal: str, goals: Sequence[str]) -> str:
     return goal or goals[0]
 
 
-def _held(hold: Sequence[str], tuning: Any) -> dict[str, float]:
-    """The keys that stay as they are, with their values."""
+def _held(hold: Sequence[str], tuning: Any, more: Sequence[str]) -> dict[str, float]:
+    """The gains that stay as they are, with their values; more keys may be held, too."""
     for key in hold:
-        if key not in tuning.keys:
-            remedy = did_you_mean(key, tuning.keys, "name keys that are chosen here")
-            raise DetentError(f"hold: got {key!r}; expected: {', '.join(tuning.keys)}; try: {remedy}")
-    return {key: tuning.stated[key] for key in hold}
+        if key not in (known := [*tuning.keys, *more]):
+            remedy = did_you_mean(key, known, "name keys that are chosen here")
+            raise DetentError(f"hold: got {key!r}; expected: {', '.join(known)}; try: {remedy}")
+    return {key: tuning.stated[key] for key in hold if key in tuning.stated}
 
 
 def _typed(spec: AxisSpec, values: Mapping[str, float]) -> dict[str, float]:

@@ -133,3 +133,43 @@ def test_gains_for_a_plant_that_nobody_knows_are_refused(tmp_path):
     assert told.values
     assert told.refusals[0].value == "mechanics.load_mass not trusted"
     assert "identify --job" in told.refusals[0].remedy
+
+
+@pytest.mark.compiled
+def test_a_job_that_leaves_no_reserve_is_refused_with_what_helps():
+    """The axis accelerates at more than its drive has, and stands at its limit meanwhile."""
+    told = detent.load(CASCADE, ["limits.acceleration=12 m/s^2", "limits.jerk=3000 m/s^3"]).tune()
+    assert not told.done
+    assert told.values
+    assert told.sentence.endswith("the job is not done with a reserve.")
+    (refusal,) = told.refusals
+    assert "limits.acceleration" in refusal.remedy
+    assert told.after is not None
+    assert not told.after.result.done or told.after.result.limited_share > 0.05
+
+
+@pytest.mark.compiled
+def test_gains_that_hunt_are_told_so_with_what_stops_it_and_what_it_depends_on():
+    sticky = [f"mechanics.friction.{way}.static=60 N" for way in ("positive", "negative")]
+    sticky += [f"mechanics.friction.{way}.stribeck=0 mm/s" for way in ("positive", "negative")]
+    told = detent.load(CASCADE, sticky).tune()
+    assert told.done
+    assert told.after is not None
+    assert told.after.stood is not None
+    assert told.after.stood.hunts
+    assert told.to_dict()["after"]["standstill"]["swing"] == told.after.stood.swing > 1e-6
+    last = told.why[-2:]
+    assert "dead band" in last[0]
+    assert "does not state" in last[1]  # of the load, whose static friction is a default
+    assert {name: text for name, _, text in told.rows}["standstill"].startswith("hunts from ")
+
+
+@pytest.mark.compiled
+def test_a_share_of_feedforward_is_written_with_its_reason_and_may_be_held(tmp_path):
+    key, file = "method.feed_forward.viscous", tmp_path / "slide.toml"
+    file.write_text(CASCADE.read_text(encoding="utf-8").replace("viscous = 1", "viscous = 0.5"), encoding="utf-8")
+    told = detent.load(file).tune()
+    assert told.values[key] == 1.0
+    text = told.save(tmp_path / "new.toml").read_text(encoding="utf-8")
+    assert "viscous = 1  # tuned, 0.5 before: viscous friction or back-EMF is stated" in text
+    assert key not in detent.load(file).tune(hold=[key]).values

@@ -154,7 +154,7 @@ def run_cascade_moves(
     finally:
         host.machine.close()
     result.time_end, result.done = host.time, not result.failure
-    result.warnings = [*_unseen(spec, result), *evidence.warnings()]
+    result.warnings, result.limited_share = [*_unseen(spec, result), *evidence.warnings()], evidence.limited_share
     return result
 
 

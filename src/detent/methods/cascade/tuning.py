@@ -15,20 +15,20 @@ The search has no random numbers and no gradient: it looks at places of a lattic
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.analysis.linear_system import largest_level
-from detent.methods.cascade.checks import LARGEST_JUMP
+from detent.methods.cascade.checks import LARGEST_JUMP, directions
 from detent.methods.cascade.derive import CascadeFigures
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.tuning import DIGITS, Bounds, digits
+from detent.methods.tuning import DIGITS, Bounds, Share, Tuning, digits
 
 Numbers = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
@@ -41,6 +41,8 @@ POINTS, DECADES = 500, 4.0  # frequencies of the search, and how far below half 
 AROUND = 60  # more of them inside each resonance
 COARSE, FINE = 10, 22  # halvings of an interval, in the logarithm
 ROUNDS, PLACES = 4, 7  # of looking closer at the best, and places each way
+FRONT = (0.7, 0.5, 0.35, 0.25)  # of the largest J: the quieter gains of which the quickest are chosen
+WITHIN = 1.002  # of their bounds, where the gains of the file lie that nothing quieter replaces
 EXACT = 12  # plants of which the worst bound is looked at exactly
 
 
@@ -279,12 +281,12 @@ RECORDINGS = {
 """What would narrow an interval, and of which keys."""
 
 
-class CascadeTuning:
+class CascadeTuning(Tuning):
     """What `tune` asks."""
 
-    goals = ("stiff", "quiet")
+    goals = ("stiff", "quiet", "quick")
     worth_text = "integral stiffness Ki Kp"
-    recordings: ClassVar = {key: text for text, keys in RECORDINGS.items() for key in keys.split()}
+    recordings: Mapping[str, str] = {key: text for text, keys in RECORDINGS.items() for key in keys.split()}
 
     def __init__(self, spec: CascadeSpec) -> None:
         pid = spec.method.structure == "pid"
@@ -293,7 +295,7 @@ class CascadeTuning:
             if pid
             else ("position_gain", "velocity_gain", "velocity_integral")
         )
-        self.pid, self.keys = pid, tuple(f"method.{name}" for name in names)
+        self.spec, self.pid, self.keys = spec, pid, tuple(f"method.{name}" for name in names)
         self.stated = {f"method.{name}": float(getattr(spec.method, name)) for name in names}
         self._plants: dict[int, tuple[Any, Plant]] = {}
 
@@ -307,7 +309,15 @@ class CascadeTuning:
         self, plants: Sequence[CascadeSpec], bounds: Bounds, goal: str, held: Mapping[str, float]
     ) -> dict[str, float]:
         """The gains; empty where none keeps the bounds on every plant."""
-        least = self.worth(self.stated) if goal == "quiet" else 0.0
+        found = self._choose(plants, bounds, held, self.worth(self.stated) if goal == "quiet" else 0.0)
+        if not found and goal == "quiet" and max(self.worst(plants, self.stated, bounds)) <= WITHIN:
+            return dict(self.stated)  # at the bound already: nothing is quieter
+        return found
+
+    def _choose(
+        self, plants: Sequence[CascadeSpec], bounds: Bounds, held: Mapping[str, float], least: float
+    ) -> dict[str, float]:
+        """The stiffest gains, or the quietest ones with at least such a stiffness."""
         short = {key: held[long] for key, long in zip(("kp", "kv", "ki"), self.keys, strict=True) if long in held}
         found = Search([self.plant(spec) for spec in plants], bounds, short, least).best()
         return self.values_of(found) if found is not None else {}
@@ -331,3 +341,44 @@ class CascadeTuning:
         """J = Ki Kp [V/(m s)]."""
         kp, _, ki = (values[key] for key in self.keys)
         return ki if self.pid else ki * kp
+
+    def front(self, plants: Sequence[CascadeSpec], bounds: Bounds, held: Mapping[str, float]) -> list[dict[str, float]]:
+        """The stiffest gains, then the quietest ones of each share of that stiffness."""
+        stiffest = self._choose(plants, bounds, held, 0.0)
+        if not stiffest or not self.worth(stiffest):
+            return [stiffest] if stiffest else []
+        quieter = (self._choose(plants, bounds, held, share * self.worth(stiffest)) for share in FRONT)
+        return [stiffest, *(values for values in quieter if values)]
+
+    def settling(self, result: Any) -> float:
+        """How long the slowest move of a run took [s]; infinite where one did not settle."""
+        times = [move.settling for move in result.moves]
+        return max(times, default=math.inf) if result.done and not any(map(math.isnan, times)) else math.inf
+
+    def shares(self, stated: Container[str], known: Mapping[str, float]) -> list[Share]:
+        """All of what is stated, of Coulomb friction as much as is known, and nothing of what is not."""
+        return list(_shares(self.spec, stated, known))
+
+
+def _shares(spec: CascadeSpec, stated: Container[str], known: Mapping[str, float]) -> Iterator[Share]:
+    """Shares of feedforward."""
+    key, now = "method.feed_forward.", spec.method.feed_forward
+    yield Share(f"{key}velocity", 1.0, "Feedforward of velocity is 1: the reference knows it.")
+    yield Share(f"{key}acceleration", 1.0, "Feedforward of acceleration is 1: the moving masses are stated.")
+    given = {
+        name: [one for one in (f"{table}.{name}" for table in directions(spec)) if one in stated]
+        for name in ("viscous", "coulomb")
+    }
+    drags = bool(given["viscous"]) or spec.back_emf_drag > 0.0
+    why = "viscous friction or back-EMF is stated" if drags else "neither viscous friction nor back-EMF is stated"
+    yield Share(f"{key}viscous", float(drags), f"Feedforward of viscous friction is {int(drags)}: {why}.")
+    unsure = [known[one] for one in given["coulomb"] if one in known]
+    share = max(0.0, round(1.0 - max(unsure), 2)) if unsure else now.coulomb if given["coulomb"] else 0.0
+    why = (
+        f"[tolerance] leaves {100 * max(unsure):.3g} % of it open" if unsure
+        else "as in the file, where [tolerance] does not say how well it is known" if given["coulomb"]
+        else "it is not stated"
+    )  # fmt: skip
+    yield Share(f"{key}coulomb", share, f"Feedforward of Coulomb friction is {share:g}: {why}.")
+    if spec.mechanics.weight != 0.0 or spec.mechanics.pendulum != 0.0:
+        yield Share(f"{key}weight", 1.0, "Feedforward of the weight is 1: it is stated.")

@@ -6,11 +6,11 @@ least A that keeps the bounds, the one with the least A B is chosen: a count of 
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 from detent.methods.filtered_servo.derive import FilteredFigures
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.tuning import Bounds, digits
+from detent.methods.tuning import Bounds, Tuning, digits
 
 LEAST_DAMPING = 0.5
 LEAST_MARGIN = 2.0  # factor by which the gain of the axis may grow until the loop no longer settles
@@ -24,13 +24,13 @@ RECORDINGS = {"short ramps both ways, with the current": "moving_mass rotor_iner
 """What would narrow an interval, and of which keys."""
 
 
-class FilteredTuning:
+class FilteredTuning(Tuning):
     """What `tune` asks."""
 
     keys = (PERIOD, SCALE, COEFFICIENT)
     goals = ("quiet",)
     worth_text = "calmness 1/(A B)"
-    recordings: ClassVar = {key: text for text, keys in RECORDINGS.items() for key in keys.split()}
+    recordings: Mapping[str, str] = {key: text for text, keys in RECORDINGS.items() for key in keys.split()}
 
     def __init__(self, spec: FilteredServoSpec) -> None:
         method = spec.method

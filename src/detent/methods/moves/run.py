@@ -245,7 +245,7 @@ def run_moves(host: Host, job: MoveJob, *, progress: Progress | None = None) -> 
     if lines := getattr(plant, "interference", None):
         result.faults = {name: getattr(lines, register) for name, register in FAULTS.items()}
     result.done = not result.failure and len(result.moves) == len(result.job.moves)
-    result.warnings = [*_early(result), *host.evidence.warnings()]
+    result.warnings, result.limited_share = [*_early(result), *host.evidence.warnings()], host.evidence.limited_share
     return result
 
 

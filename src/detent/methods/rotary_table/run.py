@@ -286,6 +286,7 @@ class _WatchedTable(TableObserver):
         result.time_end = self._host.machine.time
         result.inputs, result.outputs = controller.inputs, controller.outputs
         result.warnings = [*self._beside(), *controller.warnings, *self._evidence.warnings()]
+        result.limited_share = self._evidence.limited_share
         result.travel = sum(abs(step.travel) for step in result.steps)
         net = self.angle - self._first
         # A turn is whole that ends where it began, within the window.

@@ -2,11 +2,10 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 from detent.methods.rotary_table.derive import TableFigures
 from detent.methods.rotary_table.schema import RotaryTableSpec
-from detent.methods.tuning import Bounds, digits
+from detent.methods.tuning import Bounds, Tuning, digits
 
 HALVINGS = 40
 LEAST, MOST = 1e-4, 1.0  # gains that are looked at, times the strobe period
@@ -17,13 +16,13 @@ RECORDINGS = {"steps of the speed word, with the speed": "droop time_constant"}
 """What would narrow an interval, and of which keys."""
 
 
-class TableTuning:
+class TableTuning(Tuning):
     """What `tune` asks."""
 
     keys = (KEY,)
     goals = ("stiff",)
     worth_text = "position gain"
-    recordings: ClassVar = {key: text for text, keys in RECORDINGS.items() for key in keys.split()}
+    recordings: Mapping[str, str] = {key: text for text, keys in RECORDINGS.items() for key in keys.split()}
 
     def __init__(self, spec: RotaryTableSpec) -> None:
         self.stated = {KEY: spec.method.position_gain}

@@ -1,0 +1,80 @@
+"""An axis with some gains: its margins, and what its simulation does with a job."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from detent.analysis.linear_system import Margins
+from detent.files.findings import Caution
+from detent.methods.check import check_spec
+from detent.methods.load import AxisFile
+from detent.methods.registry import METHODS
+from detent.tune.standstill import Standstill, standstill
+from detent.units import format_quantity
+
+STARTS = 8  # at standstill, from which it is left to itself
+NONE = "none: it does not settle"
+MEASURES = ("Ms at", "phase margin at", "gain margin at")
+
+
+@dataclass(frozen=True)
+class Stand:
+    """An axis with some gains: its margins by the cut, what it does with the job, and what `check` says."""
+
+    file: AxisFile
+    margins: Mapping[str, Margins]
+    settles: bool
+    bandwidth: float | None  # of the reference to the position [Hz]
+    result: Any
+    summary: Sequence[tuple[str, str]]
+    cautions: Sequence[Caution]
+    stood: Standstill | None  # what it does at standstill; None where it does not settle, or nothing watches it
+
+    @classmethod
+    def of(cls, file: AxisFile, job: Any) -> "Stand":
+        """Try a job on an axis."""
+        spec = file.spec
+        method = METHODS[spec.axis.method]
+        model, result = method.linear(spec), method.run(spec, job)
+        outer = [cut for cut in model.loops if "position" in cut]
+        bandwidth = model[outer[0]].closed().bandwidth if outer and model.settles else None
+        summary = method.summary(spec, result)
+        stood = standstill(spec, STARTS) if method.stands and model.settles else None
+        return cls(file, model.margins, model.settles, bandwidth, result, summary, check_spec(file).warnings, stood)
+
+    @property
+    def at_rest(self) -> str:
+        """What it does at standstill, in words; empty where nothing watched it."""
+        if self.stood is None:
+            return ""
+        share = f"{self.stood.outcome} from {round(self.stood.shares[self.stood.outcome] * STARTS)} of {STARTS} starts"
+        swing = f", {format_quantity(self.stood.swing, self.stood.ensemble.unit, 3)}" if self.stood.hunts else ""
+        return share + swing
+
+    @property
+    def sensitivity(self) -> tuple[float, float]:
+        """Largest Ms of all cuts, and its frequency [Hz]."""
+        worst = max(self.margins.values(), key=lambda one: one.sensitivity)
+        return worst.sensitivity, worst.peak
+
+    @property
+    def told(self) -> str:
+        """The same in words; margins of loops that do not settle mean nothing."""
+        level, peak = self.sensitivity
+        return f"{level:.3g} at {format_quantity(peak, 'Hz', 3)}" if self.settles else NONE
+
+    def rows(self) -> Iterator[tuple[str, str]]:
+        """Figures to be laid beside those of other gains."""
+        for cut, one in self.margins.items():
+            if not self.settles:
+                yield from ((f"{what} {cut}", NONE) for what in MEASURES)
+                continue
+            yield f"Ms at {cut}", f"{one.sensitivity:.3g} at {format_quantity(one.peak, 'Hz', 3)}"
+            yield f"phase margin at {cut}", format_quantity(one.phase, "rad", 3)
+            yield f"gain margin at {cut}", f"{one.gain:.3g}" if math.isfinite(one.gain) else "any"
+        if any("position" in cut for cut in self.margins):
+            yield "bandwidth, -3 dB", format_quantity(self.bandwidth, "Hz", 3) if self.bandwidth else "none"
+        if METHODS[self.file.spec.axis.method].stands:
+            yield "standstill", self.at_rest or NONE
+        yield from ((name, text.partition(", from ")[0]) for name, text in self.summary)
