@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from detent.identify.identified import Identified, identify_axis
     from detent.operate.client import LiveAxis
     from detent.operate.start import connect, live
+    from detent.tune.tolerated import Tolerated
     from detent.tune.tuned import Tuned
 
 __version__ = "0.1.0"
@@ -28,12 +29,13 @@ _PLACES = {
     "detent.identify.identified": ("Identified", "identify_axis"),
     "detent.operate.start": ("connect", "live"),
     "detent.operate.client": ("LiveAxis",),
+    "detent.tune.tolerated": ("Tolerated",),
     "detent.tune.tuned": ("Tuned",),
 }
 """Where the words of the API stand; each loads at its first use: `import detent` and `detent --help` stay quick."""
 
 __all__ = [
-    "Analysed", "Axis", "DetentError", "Identified", "InputError", "LiveAxis", "Run", "Timing", "Tuned",
+    "Analysed", "Axis", "DetentError", "Identified", "InputError", "LiveAxis", "Run", "Timing", "Tolerated", "Tuned",
     "__version__",
     "analyse", "connect", "example", "examples", "identify_axis", "live", "load", "load_trace",
 ]  # fmt: skip

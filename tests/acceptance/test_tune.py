@@ -7,7 +7,7 @@ import random
 import numpy as np
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
-from tests.tolerance_rig import QUESTION, fill, fill_killed
+from tests.store_rig import QUESTION, fill, fill_killed
 
 import detent
 from detent.analysis.sampled_loop import SampledLoop
