@@ -384,7 +384,7 @@ def test_35_a_store_outlives_kills_at_any_moment(tmp_path, cases, kills):
         pass
 
 
-def asked(folder, entries: str = SET_OF_8, target: float = 0.12) -> Question:
+def machines(folder, entries: str = SET_OF_8, target: float = 0.12) -> Question:
     """What becomes of machines of the example that make one move."""
     file = folder / "slide.toml"
     file.write_text(CASCADE.read_text(encoding="utf-8") + entries, encoding="utf-8")
@@ -396,7 +396,7 @@ def asked(folder, entries: str = SET_OF_8, target: float = 0.12) -> Question:
 @pytest.mark.compiled
 def test_36_workers_of_dask_give_the_same_bytes_though_one_is_killed(tmp_path, monkeypatch):
     """With test 34: in one piece, and in chunks by others, case by case the same."""
-    question, spans = asked(tmp_path), [(first, 10) for first in range(0, 100, 10)]
+    question, spans = machines(tmp_path), [(first, 10) for first in range(0, 100, 10)]
     here = run_chunk(question, 0, 100)
     killed = partial(run_killed, at=40, once=str(tmp_path / "once"))
     for run in (run_chunk, killed):
