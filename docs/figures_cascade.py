@@ -87,4 +87,28 @@ def which_encoder() -> None:
         areas[-1].set_xlabel("time since the reference ended [ms]")
 
 
-FIGURES = (feed_forward, profiles, which_encoder)
+def tolerance() -> None:
+    """How a quantity of many machines spreads, and which of them fail, as the report of `detent tolerance` draws it."""
+    import tempfile
+    from pathlib import Path
+
+    import detent
+    from detent.page.draw import draw_figures
+    from detent.tune.tolerance_page import tolerance_page
+
+    # The file of the page "How many of a hundred machines will be good?".
+    page = (Path(__file__).parent / "how-to" / "how-many-are-good.md").read_text(encoding="utf-8")
+    entries = page.partition("<!-- file: tolerance.toml -->\n```toml\n")[2].partition("```")[0]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "slide.toml")
+        file.write_text(
+            Path(detent.example("cascade.toml")).read_text(encoding="utf-8") + "\n" + entries, encoding="utf-8"
+        )
+        file.with_name("there.toml").write_text('[[move]]\ntarget = "150 mm"\n')
+        asked = detent.load(file)
+        found = asked.tolerance(file.with_name("there.toml"), cases=400, limits=["peak_command <= 2.35 V"])
+    drawn = [one for one in tolerance_page(found).figures if one.title in {"peak_command", "Where the bad ones lie"}]
+    draw_figures(drawn[::-1], FOLDER / "tolerance.png")
+
+
+FIGURES = (feed_forward, profiles, which_encoder, tolerance)

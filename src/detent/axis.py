@@ -30,6 +30,7 @@ from detent.runs import Run, Timing
 if TYPE_CHECKING:
     from detent.methods.linear import LinearModel
     from detent.tune.hunted import Hunted
+    from detent.tune.tolerated import Tolerated
     from detent.tune.tuned import Tuned
 
 KEPT_ROWS = 100_000  # rows in memory beside a trace file, 40 s at the usual rate: the report draws from these
@@ -371,6 +372,69 @@ class Axis(OnScreen):
             self.file, starts=starts, seed=seed, on_counts=on_counts, dead_band=dead_band, map_it=map_it,
             progress=progress,
         )  # fmt: skip
+
+    def tolerance(  # noqa: PLR0913 - what may be asked
+        self,
+        job: str | Path | Job | None = None,
+        *,
+        cases: int = 1000,
+        seed: int = 1,
+        limits: Sequence[str] = (),
+        margins: bool = False,
+        store: str | Path | None = None,
+        workers: int = 0,
+        dask: str = "",
+        yes: bool = False,
+        progress: Progress | None = None,
+    ) -> "Tolerated":
+        """Make a job on many machines that differ in the keys of ``[tolerance]``, and say how many are good.
+
+        The values of a case are a function of the seed, its number and the key alone; case 0 is the machine of the
+        file.
+
+        Parameters
+        ----------
+        job : path or job object, optional
+            What each machine does. Default: of an axis that makes moves, half of the travel and back.
+        cases : int
+            How many machines.
+        seed : int
+            0 to 2**64 - 1: another one draws other machines.
+        limits : sequence of str
+            What passes beside that the job is done: ``"peak_following <= 45 um"``. Default: what the file says.
+        margins : bool
+            Margins of the loops are quantities, too.
+        store : path, optional
+            Folder that keeps each chunk of cases; one of the same question is continued.
+        workers : int
+            Threads, or processes where the method runs each machine for itself; 0 for all processors. A script whose
+            processes these are has its work under ``if __name__ == "__main__":``.
+        dask : str
+            Address of a Dask scheduler, or "local:2", which computes instead.
+        yes : bool
+            More than an hour is allowed.
+        progress : callable, optional
+            ``progress(share, text)``.
+
+        Returns
+        -------
+        Tolerated
+            `yields`, `figures`, `sensitivities` and `cases`; `report` writes the page.
+
+        Raises
+        ------
+        DetentError
+            Nothing is toleranced, a limit or another parameter makes no sense, or it would take more than an hour.
+        InputError
+            The job does not fit the axis, or the store is that of another question.
+        """
+        from detent.tune.tolerated import Means, tolerance
+
+        tried = None if job is None else self._job(job)
+        means = Means(store=None if store is None else Path(store), workers=workers, dask=dask, long=yes)
+        return tolerance(
+            self.file, job=tried, cases=cases, seed=seed, limits=limits, margins=margins, means=means, progress=progress
+        )
 
     def envelopes(self) -> Mapping[str, Any]:
         """Table of permissible frequencies, an `Envelope`, of each motor by name, between its extremes at power-on.

@@ -4,15 +4,16 @@ import json
 import math
 import random
 import re
+from functools import partial
 
 import numpy as np
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
-from tests.identify_files import write_log
-from tests.standstill_rig import both, example, rigid, told
-from tests.tolerance_rig import QUESTION, fill, fill_killed
+from tests.identify_files import columns_of, write_log
 from tests.standstill_rig import RIGID, both, drawn, example, rigid, told
+from tests.store_rig import QUESTION, fill, fill_killed, run_killed
+from tests.tolerance_rig import QUESTION, fill, fill_killed
 from typer.testing import CliRunner
 
 import detent
@@ -20,7 +21,7 @@ from detent.analysis.sampled_loop import SampledLoop
 from detent.analysis.sensitivity import clopper_pearson, sensitivity
 from detent.axis import Axis
 from detent.cli.app import app
-from detent.errors import InputError
+from detent.errors import DetentError, InputError
 from detent.files.source import parse_source
 from detent.methods.cascade.loop import LinearLoop
 from detent.methods.cascade.tuning import CascadeTuning
@@ -30,7 +31,8 @@ from detent.methods.moves.job import one_move
 from detent.methods.registry import METHODS
 from detent.methods.rotary_table.loop import HeldLoop
 from detent.methods.tuning import Bounds
-from detent.tune import store
+from detent.tune import store, workers
+from detent.tune.batch import Question, draw, run_chunk
 from detent.tune.choice import Chooser
 from detent.tune.plants import Plants
 from detent.tune.standstill import look, standstill
@@ -607,6 +609,8 @@ def test_35_a_store_outlives_kills_at_any_moment(tmp_path, cases, kills):
         assert (killed / path.name).read_bytes() == path.read_bytes()
     with pytest.raises(InputError, match="another seed"), store.opened(killed, {**QUESTION, "hash": "", "seed": 2}):
         pass
+
+
 LEAPING = [*(drawn(number) for number in (6, 12, 63, 81)), rigid(40, 0, stribeck=0.3), rigid(30, 0.1), rigid(40, 1),
            rigid(30, 0, integral=30)]  # fmt: skip
 
@@ -677,3 +681,58 @@ def test_27_where_the_file_does_not_say_how_friction_falls_there_is_a_table():
     assert outcomes[1.0, 3e-3] in ("rests", "flickers")
     assert outcomes[2.0, 0.0] == "hunts"
     assert any("of 16 that may be" in one for one in found.told)
+
+
+def machines(folder, entries: str = SET_OF_8, target: float = 0.12) -> Question:
+    """What becomes of machines of the example that make one move."""
+    file = folder / "slide.toml"
+    file.write_text(CASCADE.read_text(encoding="utf-8") + entries, encoding="utf-8")
+    return Question.of(detent.load(file).file, one_move("there", target, 0.1))
+
+
+@pytest.mark.process
+@pytest.mark.long
+@pytest.mark.compiled
+def test_36_workers_of_dask_give_the_same_bytes_though_one_is_killed(tmp_path, monkeypatch):
+    """With test 34: in one piece, and in chunks by others, case by case the same."""
+    question, spans = machines(tmp_path), [(first, 10) for first in range(0, 100, 10)]
+    here = run_chunk(question, 0, 100)
+    killed = partial(run_killed, at=40, once=str(tmp_path / "once"))
+    for run in (run_chunk, killed):
+        found = dict(workers.on_dask(run, question, spans, "local:2"))
+        there = store.joined([found[span] for span in spans], 100)
+        for kind in ("values", "results"):
+            for name, values in getattr(here, kind).items():
+                assert getattr(there, kind)[name].tobytes() == values.tobytes(), name
+        assert there.reason.tolist() == here.reason.tolist()
+    assert (tmp_path / "once").exists()
+    monkeypatch.setattr(workers, "source_hash", lambda: "0123")
+    with pytest.raises(DetentError, match=r"the worker tcp://.* has source hash .*; expected: 0123"):
+        list(workers.on_dask(run_chunk, question, spans, "local:1"))
+
+
+@pytest.mark.compiled
+def test_37_what_is_identified_is_drawn_in_its_interval(tmp_path):
+    """A recording of the example, moves at several speeds: every trusted constant varies between its ends."""
+    base, log, made = detent.load(CASCADE), tmp_path / "run.csv", tmp_path / "slide.toml"
+    job = tmp_path / "moves.toml"
+    job.write_text("repeat = 3\n" + "".join(
+        f'[[move]]\ntarget = "{target} mm"\nspeed = "{speed} mm/s"\n'
+        for target, speed in ((250, 400), (100, 300), (180, 150), (100, 60), (130, 30), (100, 200))
+    ))  # fmt: skip
+    made.write_text(CASCADE.read_text(encoding="utf-8"), encoding="utf-8")
+    write_log(log, columns_of(base.run(job)), force="voltage [V]")
+    found = detent.identify_axis(log, axis=made)
+    assert {"mass", "coulomb.negative", "viscous.negative"} <= set(found.trusted)
+    found.save(made)
+    axis = detent.load(made)
+    known = {change.key.removeprefix("tolerance.") for change in found.changes(tmp_path / "slide.toml")}
+    assert not known  # written once, written for good
+    assert {one for one in axis.file.tolerance if one.endswith("mass")}
+    values = draw(Question.of(axis.file, one_move("there", 0.12, 0.1)), 0, 2000)
+    for key, one in axis.file.tolerance.items():
+        if not one.whole:
+            low, high = np.quantile(values[key], [0.025, 0.975])
+            assert low == pytest.approx(one.low, abs=0.05 * (one.high - one.low)), key
+            assert high == pytest.approx(one.high, abs=0.05 * (one.high - one.low)), key
+    assert axis.tolerance(one_move("there", 0.12, 0.1), cases=10, workers=1).figures["error"].most > 0.0

@@ -151,22 +151,10 @@ def cholesky(matrix: Sequence[Sequence[float]]) -> list[list[float]] | None:
 
 
 def joint(found: Mapping[str, Tolerance], shares: Mapping[str, Shares]) -> dict[str, Shares]:
-    """Shares that go together as the table says, from independent ones; those of other keys stay to the bit.
+    """Shares of each key, shape (n,), that go together as the table says, from independent ones.
 
     A Gaussian copula: the normal numbers of the shares are mixed by the lower factor of the correlations, in the order
-    of the table, so that a key does not depend on those behind it.
-
-    Parameters
-    ----------
-    found : mapping of str to Tolerance
-        The table.
-    shares : mapping of str to ndarray
-        Of each key, shares above 0 and below 1, shape (n,).
-
-    Returns
-    -------
-    dict of str to ndarray
-        The same keys.
+    of the table, so that a key does not depend on those behind it; shares of other keys stay to the bit.
     """
     names, matrix = correlations(found)
     if not names:

@@ -18,6 +18,7 @@ POINTS = 3000  # points of one curve: three per pixel of a wide screen
 
 LANE_HEIGHT = 26  # height of a lane [px]
 FOOT_HEIGHT = 44  # height of what is above and below the lanes [px]
+BINS = 40  # of values that are spread
 PLACES = 600  # places at which the cursor stops besides the ends of the bars of lanes
 
 SCALES: dict[str, tuple[float, int]] = {"ms": (1e3, 3), "s": (1.0, 5)}
@@ -224,6 +225,26 @@ def histogram_chart(
         "zero": True,
         "marks": [{"x": round(value, 3), "label": "limit"} for value in limits],
         "series": series,
+    }
+
+
+def spread_chart(name: str, values: Numbers, labels: tuple[str, str], marks: Sequence[tuple[float, str]] = ()) -> Chart:
+    """Count values per bin, from the least to the largest and the places that are marked."""
+    ends = [float(values.min()), float(values.max()), *(place for place, _ in marks)]
+    low, high = min(ends), max(ends)
+    width = (high - low) / BINS or max(abs(low), 1.0) / BINS
+    digits = max(0, 3 - int(np.floor(np.log10(width))))
+    edges = low - 0.5 * width + width * np.arange(BINS + 2)
+    counts = np.histogram(values, edges)[0].astype(int).tolist()
+    return {
+        "id": name,
+        "x": rounded((edges[:-1] + edges[1:]) / 2, digits),
+        "xLabel": labels[0],
+        "yLabel": labels[1],
+        "height": 220,
+        "zero": True,
+        "marks": [{"x": round(place, digits), "label": label} for place, label in marks],
+        "series": [{"label": labels[1], "colour": "speed", "bars": 0, "y": counts}],
     }
 
 

@@ -62,22 +62,9 @@ class Store:
 def opened(folder: Path, question: Mapping[str, Any], size: int = SIZE) -> Generator[Store]:
     """Have the store of a question for this process alone, made where it is not there yet.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    question : mapping
-        What is asked, as plain data; its "hash" is what must agree.
-    size : int
-        Cases of a chunk, of a folder that is made anew.
-
-    Raises
-    ------
-    InputError
-        The folder is that of another question, or holds something else.
-    DiskError
-        It cannot be written, or another process writes there.
+    The "hash" of the question must agree; the `size` of chunks is that of a folder that is made anew.
     """
+    question = json.loads(json.dumps(question, default=str))
     with write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder, folder):

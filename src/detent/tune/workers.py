@@ -4,6 +4,8 @@ A chunk is a plain function of a question and of the numbers of its cases, so th
 """
 
 import os
+import platform
+import sys
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
@@ -53,6 +55,11 @@ def _end_with_parent() -> None:
         threading.Thread(target=lambda: (wait([parent.sentinel]), os._exit(1)), daemon=True).start()
 
 
+def machine() -> dict[str, str]:
+    """What the last bits of a result may depend on beside that: library and processor."""
+    return {"python": sys.version.split()[0], "machine": platform.machine(), "library": " ".join(platform.libc_ver())}
+
+
 # ---- Dask
 
 
@@ -66,21 +73,8 @@ def identity() -> dict[str, str]:
 def on_dask(run: Compute, question: Any, spans: Sequence[Span], address: str) -> Computed:
     """Chunks as they are done, by the workers of a Dask scheduler; results come here, and nothing else is shared.
 
-    Parameters
-    ----------
-    run : callable
-        ``run(question, first, count)`` of a module that the workers have.
-    question : object
-        What is asked.
-    spans : sequence of tuple
-        First case and number of cases of each chunk.
-    address : str
-        Of the scheduler, as in ``tcp://host:8786``; "local:2" starts two workers here.
-
-    Raises
-    ------
-    DetentError
-        Dask is not installed, no scheduler or no worker answers, or a worker has other sources.
+    The address is that of the scheduler, as in ``tcp://host:8786``; "local:2" starts one here, with two workers. A
+    worker with other sources is refused.
     """
     with _client(address) as client:
         _check_workers(client)

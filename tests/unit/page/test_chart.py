@@ -16,6 +16,7 @@ from detent.page.chart import (
     histogram_chart,
     line_chart,
     spans_of,
+    spread_chart,
     time_charts,
 )
 from detent.page.parts import Event
@@ -135,3 +136,15 @@ def test_bars_are_never_finer_than_asked() -> None:
 def test_limits_are_marked_where_the_values_come_near(limit: float, marks: list[float]) -> None:
     chart = histogram_chart("h", [heap([1.0])], LABELS, finest=0.1, limit=limit)
     assert [mark["x"] for mark in chart["marks"]] == marks
+
+
+@pytest.mark.parametrize(
+    "values", [np.array([1.0, 2.0, 2.0, 4.0]), np.full(3, 5.0), np.zeros(2), np.array([1e-9, 3e-9])]
+)
+def test_a_spread_counts_every_value_and_reaches_to_its_marks(values):
+    drawn = spread_chart("spread", values, ("error [um]", "cases"), [(6.0, "limit")])
+    assert sum(drawn["series"][0]["y"]) == len(values)
+    assert drawn["x"][0] <= values.min()
+    assert drawn["x"][-1] >= 6.0 - 1e-6
+    assert drawn["marks"] == [{"x": 6.0, "label": "limit"}]
+    assert sum(spread_chart("spread", values, ("error", "cases"))["series"][0]["y"]) == len(values)

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from tests.tolerance_rig import QUESTION, computed, fill
+from tests.store_rig import QUESTION, computed, fill
 
 from detent.errors import DiskError, InputError
 from detent.tune.store import joined, opened

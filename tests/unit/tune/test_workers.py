@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from tests.tolerance_rig import computed, killed_once
+from tests.store_rig import computed, killed_once
 
 from detent.errors import DetentError
 from detent.tune import workers
@@ -41,7 +41,7 @@ def test_processes_give_every_chunk_once():
 def test_a_worker_ends_with_its_parent(tmp_path):
     """One that is killed cannot tell its workers, which wait for work."""
     text = (
-        "import os, sys\nfrom tests.tolerance_rig import computed\nfrom detent.tune.workers import in_processes\n"
+        "import os, sys\nfrom tests.store_rig import computed\nfrom detent.tune.workers import in_processes\n"
         "if __name__ == '__main__':\n"
         "    found = in_processes(computed, {'note': sys.argv[1]}, [(0, 9), (9, 9)], 1)\n"
         "    next(found)\n    import multiprocessing\n"

@@ -34,23 +34,8 @@ def tolerance_values(
 
     A trusted constant has its 95 % interval, normal, or uniform where a normal distribution would leave what the key
     may be. One that is not trusted is marked so: until somebody states its interval, `tune` and `tolerance` refuse. An
-    entry that somebody wrote stays where it holds the new value.
-
-    Parameters
-    ----------
-    numbers : sequence of Number
-        What the identification says.
-    constants : Constants or None
-        The same with the correlation of their errors.
-    text : str
-        The axis file.
-    held : collection of str
-        Keys that have a value.
-
-    Returns
-    -------
-    list of NewValue
-        In the order of the numbers.
+    entry that somebody wrote into the `text` of the axis file stays where it holds the new value; `held` are the keys
+    that have a value there.
     """
     known = {one.name: one for one in numbers if one.name}
     told = [one for one in numbers if one.name and not _is_theirs(one, text)]

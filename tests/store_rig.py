@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from detent.tune.batch import Chunk
+from detent.tune.batch import Chunk, Question, run_chunk
 from detent.tune.store import joined, opened
 
 QUESTION = {"hash": "0123", "seed": 1, "axis": "a slide"}
@@ -39,6 +39,12 @@ def killed_once(question: dict[str, object], first: int, count: int) -> Chunk:
         else:
             os._exit(9)
     return computed(question, first, count)
+
+
+def run_killed(question: Question, first: int, count: int, at: int, once: str) -> Chunk:
+    """A chunk of machines, by a worker that is killed the first time that it comes to some case."""
+    killed_once({"killed at": at, "once": once}, first, 1)
+    return run_chunk(question, first, count)
 
 
 def fill(folder: Path, cases: int, size: int = 100, note: str = "", work: int = 0) -> Chunk:
