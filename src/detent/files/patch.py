@@ -28,6 +28,7 @@ class NewValue(NamedTuple):
     unit: str  # SI unit
     note: str  # what is said of it in a comment
     by: str = "identified"  # or "tuned": where it comes from
+    exact: bool = False  # in the SI unit, with all digits: what is read again has the same bits
 
 
 class Change(NamedTuple):
@@ -142,6 +143,8 @@ def _new(value: NewValue) -> tuple[Change, str]:
 
 def _written(value: NewValue, old: Any) -> str:
     """A value as it is written in a file: in the unit and the quotes of the old one."""
+    if value.exact:
+        return f'"{value.value!r} {value.unit}"' if value.unit else repr(value.value)
     if not value.unit:
         return f"{value.value:.{DIGITS}g}"
     if not isinstance(old, str):
