@@ -5,6 +5,7 @@ import pickle
 
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
+from tests.tolerance_rig import asked, quick
 
 import detent
 from detent.methods.batch import kind_of
@@ -59,7 +60,18 @@ def test_default_limits_are_those_of_the_file(tmp_path):
 @pytest.mark.parametrize(
     ("failure", "kind"),
     [("move 3 to 0.5 m: did not arrive within 2 s; it is at rest", "did not arrive within ..."),
-     ("after power-on: the axis ran faster than 1.1 x 0.5 m/s, and", "the axis ran faster than ... ...")],
+     ("after power-on: the axis ran faster than 1.1 x 0.5 m/s, and", "the axis ran faster than ...")],
 )  # fmt: skip
 def test_kinds_of_failures_hold_no_values(failure, kind):
     assert kind_of(failure) == kind
+
+
+def test_margins_are_quantities_where_they_are_asked_for(tmp_path):
+    tolerance = '\n[tolerance]\n"mechanics.load_mass" = "10 %"\n'
+    question = asked(tmp_path, tolerance, one_move("none", 0.0, 0.0), quick(), margins=True)
+    units = {one.name: one.unit for one in quantities(question)}
+    assert units["phase margin at command"] == "rad"
+    chunk = run_chunk(question, 0, 2)
+    values = {key: float(each[1]) for key, each in chunk.values.items()}
+    margins = question.method.linear(question.machine(values).spec).margins["command"]
+    assert chunk.results["Ms at command"][1] == margins.sensitivity != chunk.results["Ms at command"][0]

@@ -41,6 +41,7 @@ class CascadeMethod(Method[CascadeSpec]):
     linear_loops = "loop:linear_loops"
     tunes = "tuning:CascadeTuning"
     stands = "standstill:CascadeEnsemble"
+    keeps, batches = "build:kept", "batch:CascadeBatch"
     leaves_out = (
         "Neglected: saturation, quantization, Coulomb and Stribeck friction; both masses move, backlash is closed.",
     )
@@ -74,6 +75,10 @@ class CascadeMethod(Method[CascadeSpec]):
         """Moves, or a recording."""
         place = "replay:run_cascade_replay" if job.kind == "replay" else "run:run_cascade_moves"
         return self.brought(place)(spec, job, recorder=recorder, progress=progress)
+
+    def batch(self, spec: CascadeSpec, job: Any) -> Any:
+        """Moves on many axes at once; recordings one by one."""
+        return None if job.kind == "replay" else super().batch(spec, job)
 
     def sample_job(self, spec: CascadeSpec) -> MoveJob:
         """A short way to where there is more room."""
