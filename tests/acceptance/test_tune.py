@@ -797,8 +797,8 @@ def test_34_a_case_is_the_same_in_any_chunk(tmp_path):
     question = asked(tmp_path)
     alone = case_of(run_chunk(question, 4711, 1), 4711)
     assert case_of(run_chunk(question, 4700, 40), 4711) == alone
-    for workers in (1, 2):
-        chunks = list(run_chunks(question, [(4690, 10), (4700, 17)], workers))
+    for threads in (1, 2):
+        chunks = list(run_chunks(question, [(4690, 10), (4700, 17)], threads))
         assert [one.first for one in chunks] == [4690, 4700]
         assert case_of(chunks[1], 4711) == alone
     more = run_chunk(asked(tmp_path, SLIDE + '"method.timeout" = "10 %"\n'), 4711, 1)

@@ -140,3 +140,11 @@ def arrow(direction: int) -> Markup:
     """An arrow to the right for +1, to the left for -1, in the colour of the direction."""
     name, sign = ("right", "\u2192") if direction > 0 else ("left", "\u2190")
     return Markup('<span class="arrow {}">{} {}</span>').format(name, sign, name)
+
+
+def percent(share: float) -> str:
+    """Write a share in percent, with three digits: 5.74 %, and two where it is small."""
+    if isnan(share):
+        return "\u2013"
+    value = 100 * share
+    return f"{number(value, 3 if value >= 0.1 else 2)}{GAP}%"

@@ -16,12 +16,11 @@ from detent.identify.fit.estimate import quantile, rms
 from detent.identify.fit.free_run import HORIZONS, Horizon, Plant, free_run, start_velocities
 from detent.identify.fit.identification import HELD_OUT, Identification, prepare_all
 from detent.identify.page.words import SINCE, Ways, digits_for, effort_scale, label_of, long_bar, peak_of, scaled
-from detent.methods.cascade.units import percent
 from detent.page import chart
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
 from detent.page.table import Table
-from detent.page.words import count, duration, number
+from detent.page.words import count, duration, number, percent
 
 RESTART = 1.0  # time after which the simulation starts again from the recording [s]
 SPREAD = 0.5  # room about a measured position for a simulated one that runs away, over its range

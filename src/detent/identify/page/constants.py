@@ -11,11 +11,10 @@ from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.ladder import Climb
 from detent.identify.page import words
-from detent.methods.cascade.units import percent
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
 from detent.page.table import Table
-from detent.page.words import GAP, further, number
+from detent.page.words import GAP, further, number, percent
 
 WIDTH, HEIGHT = 170.0, 18.0  # of the drawing of an interval [px]
 REACHES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # ends of the scale of intervals, over the value

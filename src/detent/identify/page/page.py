@@ -13,13 +13,12 @@ from detent.identify.page.compared import effort_figures, friction_figures, hold
 from detent.identify.page.constants import constant_figures, correlation_figures, ladder_figures
 from detent.identify.page.response import response_figures
 from detent.logs.log import Action, Log, Severity, tell_rows
-from detent.methods.cascade.units import percent
 from detent.page.chart import Band, Chart, Panel, Timeline, spans_of, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Headline, Level, Page, Section, card
 from detent.page.parts import Note
 from detent.page.table import Table
-from detent.page.words import GAP, count, duration, further, number
+from detent.page.words import GAP, count, duration, further, number, percent
 
 LOOKS: dict[Verdict, Level] = {"trusted": "good", "partly trusted": "warn", "refused": "bad"}
 # Constants in large type.

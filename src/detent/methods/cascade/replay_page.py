@@ -8,14 +8,14 @@ import numpy as np
 from detent.methods.cascade.page import error_panel, pair_panel
 from detent.methods.cascade.replay import Compared, ReplayRun
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.cascade.units import percent, units_of
+from detent.methods.cascade.units import units_of
 from detent.page.chart import Chart, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Headline, Page, Section, card
 from detent.page.parts import Note
 from detent.page.run_page import page_title, warnings
 from detent.page.table import Table, bar_cell
-from detent.page.words import GAP, count, duration, number
+from detent.page.words import GAP, count, duration, number, percent
 
 ZOOM_SHARE, ZOOM_LEAST = 0.04, 0.4  # part of a recording shown around its largest difference, at least so long [s]
 

@@ -1,7 +1,5 @@
 """How the pages of a cascade axis write its quantities."""
 
-import math
-
 from detent.methods.cascade.schema import CascadeSpec
 from detent.page.units import Units
 from detent.page.words import GAP, number
@@ -15,11 +13,3 @@ def units_of(spec: CascadeSpec) -> Units:
 def milliseconds(seconds: float) -> str:
     """Write a time in milliseconds; what is round but for the last bits comes out round."""
     return f"{number(round(seconds * 1e3, 6))}{GAP}ms"
-
-
-def percent(share: float) -> str:
-    """Write a share in percent, with three digits: 5.74 %, and two where it is small."""
-    if math.isnan(share):
-        return "\u2013"
-    value = 100 * share
-    return f"{number(value, 3 if value >= 0.1 else 2)}{GAP}%"

@@ -2,8 +2,8 @@ import math
 
 import pytest
 
-from detent.methods.cascade.units import milliseconds, percent
-from detent.page.words import GAP
+from detent.methods.cascade.units import milliseconds
+from detent.page.words import GAP, percent
 
 
 @pytest.mark.parametrize(
