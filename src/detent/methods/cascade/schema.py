@@ -48,6 +48,8 @@ from detent.files.quantities import (
 
 MOST_SAMPLES = 63  # samples that the memory of an encoder or of the amplifier reaches back (`sensing.position_sensor`)
 
+BLOWS = 10  # times the largest effort that a blow from outside may twist a coupling by, which does not slip for that
+
 
 class CascadeAxisTable(AxisTable, frozen=True):
     """Name and method of the axis."""
@@ -292,7 +294,7 @@ class CascadeProtectionTable(MotionProtectionTable, frozen=True):
 
     slip: Length = optional(
         "difference between the encoders of motor and load", math.nan,
-        derived="backlash, 3 x twist of the coupling at the largest effort, 4 counts, and what their delays make of it",
+        derived="backlash, 10 x twist of the coupling at the largest effort, 4 counts, what their delays make of it",
         ge=0.0, le=1e3,
     )  # fmt: skip
     oscillation: Length = optional(
@@ -492,7 +494,7 @@ def _usual_slip(spec: CascadeSpec) -> float:
     if spec.load_encoder is None:
         return 0.0
     coupling, both = spec.mechanics.coupling, (spec.encoder, spec.load_encoder)
-    twist = 0.0 if coupling is None else coupling.backlash + 3 * spec.largest_effort / coupling.stiffness
+    twist = 0.0 if coupling is None else coupling.backlash + BLOWS * spec.largest_effort / coupling.stiffness
     late = abs(both[0].delay - both[1].delay) * spec.method.sample_period
     speed = 1.1 * max(spec.limits.speed, spec.method.velocity_limit)
     return twist + 4 * sum(one.resolution for one in both) + late * speed

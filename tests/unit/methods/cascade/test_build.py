@@ -251,7 +251,7 @@ def test_what_the_axis_has_not_got_is_not_watched():
     p = build_cascade(load("cascade", *LINKS, *HEAT, "encoder.checked=true", "limit_switches.lower=-5 mm"))
     found, ends = p.controller.supervision, p.plant.ends
     assert (found.link, found.switches, found.bears) == (20, 1, 2.0 / 0.8)
-    assert found.slip == pytest.approx(3 * 600.0 / 60e6 + 4 * 3e-6)
+    assert found.slip == pytest.approx(10 * 600.0 / 60e6 + 4 * 3e-6)
     assert found.warming == pytest.approx(0.25e-3 / 5.0, rel=1e-3)
     assert (ends.present, ends.lower, ends.upper) == (1, -5e-3, pytest.approx(0.51))
 
