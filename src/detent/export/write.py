@@ -12,9 +12,10 @@ from detent import __version__
 from detent.axis import Axis
 from detent.errors import DetentError, InputError
 from detent.export.code import FLAGS, as_json, seconds, texts
+from detent.export.translate.program import Program
 from detent.export.translate.values import RefusedError
 from detent.export.unit import options_of, outside_ranges, unit_of
-from detent.export.vectors import record
+from detent.export.vectors import Golden, record
 from detent.files.text import write_errors
 
 MANIFEST = "manifest.json"
@@ -78,8 +79,18 @@ def export_firmware(
         for name, text in texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)).items()
     }
     made["vectors/job.vec"] = golden.vectors()
-    manifest: dict[str, Any] = {
-        "detent": __version__, "name": unit.name, "axis": axis.name, "method": axis.method.name, "job": loaded.name,
+    manifest = _manifest(axis, loaded.name, golden, program)
+    made["README.md"] = readme(manifest, unit.name, seconds(axis.simulated.tick)).encode()
+    manifest["files"] = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(made.items())}
+    made[MANIFEST] = as_json(manifest).encode()
+    _write(target, made)
+    return Exported(target, unit.name, manifest)
+
+
+def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[str, Any]:
+    """What an export was made from, and what is not proven of it."""
+    return {
+        "detent": __version__, "name": golden.unit.name, "axis": axis.name, "method": axis.method.name, "job": job,
         "ticks": golden.ticks, "hash": f"{golden.hash.number:016x}", "flags": FLAGS,
         "values": {row.key: row.value for row in axis.check().rows},
         "options": {f"{one.__name__}.{key}": value for (one, key), value in options_of(golden.params).items()},
@@ -90,11 +101,6 @@ def export_firmware(
             "stores and arithmetic that may wrap": sorted(f"{w}: {t}" for w, t in program.notes.wraps),
         },
     }  # fmt: skip
-    made["README.md"] = readme(manifest, unit.name, seconds(axis.simulated.tick)).encode()
-    manifest["files"] = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(made.items())}
-    made[MANIFEST] = as_json(manifest).encode()
-    _write(target, made)
-    return Exported(target, unit.name, manifest)
 
 
 def read_manifest(folder: Path) -> dict[str, Any] | None:
