@@ -10,24 +10,39 @@ import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.identify_files import columns_of, write_log
 from tests.store_rig import QUESTION, fill, fill_killed, run_killed
+from tests.tolerance_rig import (
+    FORCE_PID,
+    SLIDE,
+    as_arrays,
+    asked,
+    case_of,
+    corners,
+    gathered,
+    one_by_one,
+    spread_of,
+    widened,
+)
+from typer.testing import CliRunner
 
 import detent
 from detent.analysis.sampled_loop import SampledLoop
 from detent.analysis.sensitivity import clopper_pearson, sensitivity
 from detent.axis import Axis
+from detent.cli.app import app
 from detent.errors import DetentError, InputError
 from detent.files.source import parse_source
 from detent.methods.cascade.loop import LinearLoop
 from detent.methods.cascade.tuning import CascadeTuning
 from detent.methods.filtered_servo.tuning import FilteredTuning
 from detent.methods.load import axis_of, load_spec
-from detent.methods.moves.job import one_move
+from detent.methods.moves.job import load_moves, one_move
 from detent.methods.rotary_table.loop import HeldLoop
 from detent.methods.tuning import Bounds
 from detent.tune import store, workers
-from detent.tune.batch import Question, draw, run_chunk
+from detent.tune.batch import Limit, Question, chunks_of, draw, run_chunk, run_chunks
 from detent.tune.choice import Chooser
 from detent.tune.plants import Plants
+from detent.tune.worst import worst, write_worst
 
 CASCADE = EXAMPLES / "cascade.toml"
 GAINS = ("method.position_gain", "method.velocity_gain", "method.velocity_integral")
@@ -437,3 +452,94 @@ def test_37_what_is_identified_is_drawn_in_its_interval(tmp_path):
             assert low == pytest.approx(one.low, abs=0.05 * (one.high - one.low)), key
             assert high == pytest.approx(one.high, abs=0.05 * (one.high - one.low)), key
     assert axis.tolerance(one_move("there", 0.12, 0.1), cases=10, workers=1).figures["error"].most > 0.0
+
+
+@pytest.mark.wide
+@pytest.mark.compiled
+def test_29_the_spread_of_a_move(tmp_path):
+    chunks = run_chunks(asked(tmp_path), chunks_of(asked(tmp_path), 4000), 2)
+    results = gathered(chunks)
+    mean, deviation, low, high = spread_of(results["peak_following"])
+    assert (mean, deviation) == (pytest.approx(38.92e-6, abs=0.3e-6), pytest.approx(3.30e-6, abs=0.15e-6))
+    assert (low, high) == (pytest.approx(33.8e-6, abs=0.5e-6), pytest.approx(44.4e-6, abs=0.5e-6))
+    assert np.mean(results["peak_following"] <= 45e-6) == pytest.approx(0.965, abs=0.01)
+    for name, (mean, within), (deviation, about) in (
+        ("peak_after", (27.4e-6, 0.3e-6), (4.15e-6, 0.15e-6)), ("peak_command", (2.295, 0.01), (0.095, 0.005)),
+    ):  # fmt: skip
+        assert spread_of(results[name])[0] == pytest.approx(mean, abs=within)
+        assert spread_of(results[name])[1] == pytest.approx(deviation, abs=about)
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("text", [CASCADE.read_text(), (EXAMPLES / "turntable.toml").read_text(), FORCE_PID])
+def test_32_arrays_build_the_bytes_of_each_file(text, tmp_path):
+    made, refused = one_by_one(question := asked(tmp_path, widened(text, random.Random(1)), text=text), 334)
+    assert as_arrays(question, 334) == (made, refused)
+    assert 5 < len(refused) < 300
+
+
+@pytest.mark.compiled
+def test_33_the_worst_case_is_run_again_from_its_file(tmp_path):
+    job = tmp_path / "moves.csv"
+    job.write_text("by [mm],dwell [ms]\n50,200\n", encoding="utf-8")
+    question = asked(tmp_path, job=load_moves(job))
+    chunks = list(run_chunks(question, chunks_of(question, 100, 50), 2))
+    found = worst(question, chunks, ["peak_following"])[0]
+    assert found.value == near(54.0e-6, 0.01)
+    assert found.value >= gathered(chunks)["peak_following"].max() == found.sampled
+    assert found.value >= corners(question)["peak_following"].max()
+    file = write_worst(question, found, tmp_path / "worst.toml", "moves.csv")
+    done = CliRunner().invoke(app, ["run", str(file), "--job", str(job), "--json"])
+    assert json.loads(done.stdout)["moves"][0]["peak_following"] == found.value
+
+
+@pytest.mark.compiled
+def test_34_a_case_is_the_same_in_any_chunk(tmp_path):
+    question = asked(tmp_path)
+    alone = case_of(run_chunk(question, 4711, 1), 4711)
+    assert case_of(run_chunk(question, 4700, 40), 4711) == alone
+    for threads in (1, 2):
+        chunks = list(run_chunks(question, [(4690, 10), (4700, 17)], threads))
+        assert [one.first for one in chunks] == [4690, 4700]
+        assert case_of(chunks[1], 4711) == alone
+    more = run_chunk(asked(tmp_path, SLIDE + '"method.timeout" = "10 %"\n'), 4711, 1)
+    assert {key: more.values[key][0] for key in alone[0]} == alone[0]
+
+
+@pytest.mark.wide
+@pytest.mark.compiled
+@pytest.mark.parametrize(("count", "size"), [(5000, 100), (5000, 1000), (100_000, 1000), (100_000, 7777)])
+def test_34_a_case_is_the_same_in_a_long_run(count, size, tmp_path):
+    question = asked(tmp_path)
+    own = next(piece for piece in chunks_of(question, count, size) if sum(piece) > 4711)
+    assert case_of(run_chunk(question, *own), 4711) == case_of(run_chunk(question, 4711, 1), 4711)
+
+
+@pytest.mark.compiled
+def test_38_impossible_variants_fail_with_their_reason(tmp_path):
+    text = '[tolerance]\n"encoder.delay" = [0, 62]\n"encoder.velocity_span" = [1, 40]\n'
+    chunk = run_chunk(asked(tmp_path, text, one_move("none", 0.0, 0.0)), 0, 60)
+    beyond = chunk.values["encoder.delay"] + chunk.values["encoder.velocity_span"] > 63
+    assert 5 < beyond.sum() < 55
+    assert [reason == "refused: encoder.velocity_span" for reason in chunk.reason] == beyond.tolist()
+    assert chunk.results["done"][beyond].sum() == 0
+    assert np.isnan(chunk.results["peak_following"][beyond]).all()
+    stiff = '"mechanics.coupling.stiffness" = { interval = ["1 N/um", "120 N/um"], distribution = "normal" }\n'
+    below = run_chunk(asked(tmp_path, f"[tolerance]\n{stiff}", one_move("none", 0.0, 0.0)), 0, 200)
+    none = below.values["mechanics.coupling.stiffness"] <= 0.0
+    assert none.any()
+    assert (below.reason[none] == "refused: mechanics.coupling.stiffness").all()
+    assert Limit("done", 1.0, least=True).kept(below.results).sum() == 200 - (below.reason != "").sum()
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_39_the_filtered_servo_by_processes(tmp_path):
+    text, stop = (EXAMPLES / "filtered_servo.toml").read_text(encoding="utf-8"), one_move("stop", 0.02, 0.3)
+    sides = "".join(f'"mechanics.friction.{side}.coulomb" = ["0 N", "3.39 N"]\n' for side in ("right", "left"))
+    rubs = asked(tmp_path, f"[tolerance]\n{sides}", stop, text)
+    results = gathered(run_chunks(rubs, chunks_of(rubs, 300), 2))
+    assert (results["error"] <= 1.5 * 5e-6).all()  # within one count, and half a one that no count shows
+    chunks = chunks_of(rubs, 300)
+    assert len(chunks) > 2
+    assert case_of(run_chunk(rubs, 171, 1), 171)[1]["error"] == results["error"][171]

@@ -7,6 +7,9 @@ second); the effort under which a standing sensor counts as stuck is twice what 
 import math
 from typing import Any
 
+import numpy as np
+
+from detent.axisfile.elementwise import is_array, most, nearest, up
 from detent.axisfile.tables import (
     EncoderTable,
     FrictionTables,
@@ -101,11 +104,11 @@ def fill_interference(p: InterferenceParams, table: InterferenceTable, tick: flo
         p.tick[k], p.kind[k] = moment, KINDS[burst.kind]
 
 
-def fill_push(p: Push, table: PushTable | None, tick: float) -> None:
+def fill_push(p: Push, table: PushTable | None, tick: Any) -> None:
     """Fill the disturbing force; `tick` is the base tick [s]."""
     if table is not None:
         p.force = table.force
-        p.begin, p.end = round(table.at / tick), round((table.at + table.duration) / tick)
+        p.begin, p.end = nearest(table.at / tick), nearest((table.at + table.duration) / tick)
 
 
 def fill_guard(p: GuardParams, table: ProtectionTable, *, sample: float, speed: float) -> None:
@@ -120,12 +123,14 @@ def fill_guard(p: GuardParams, table: ProtectionTable, *, sample: float, speed: 
     p.travel = isinstance(table, MotionProtectionTable) and table.travel
 
 
-def samples(time: float, sample: float) -> int:
+def samples(time: Any, sample: float) -> Any:
     """Samples in a time [s], rounded up; 0 for none.
 
     >>> samples(1.0, 0.3), samples(0.1, 0.3), samples(0.0, 0.3)
     (4, 1, 0)
     """
+    if is_array(time):
+        return np.where(time > 0.0, most(1, up(time / sample - 1e-9)), 0)
     return max(1, math.ceil(time / sample - 1e-9)) if time > 0.0 else 0
 
 

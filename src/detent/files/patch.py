@@ -30,6 +30,7 @@ class NewValue(NamedTuple):
     note: str  # what is said of it in a comment
     by: str = "identified"  # or "tuned": where it comes from
     text: str = ""  # as it is written, where it is no number
+    exact: bool = False  # in the SI unit, with all digits: what is read again has the same bits
 
     def path(self, tables: Mapping[str, Any]) -> Path:
         """The key as a file has it: a key of the table of tolerances stands in quotes, unless in tables of its own."""
@@ -155,6 +156,8 @@ def _written(value: NewValue, old: Any) -> str:
     """A value as it is written in a file: in the unit and the quotes of the old one."""
     if value.text:
         return value.text
+    if value.exact:
+        return f'"{value.value!r} {value.unit}"' if value.unit else repr(value.value)
     if not value.unit:
         return f"{value.value:.{DIGITS}g}"
     if not isinstance(old, str):

@@ -278,6 +278,18 @@ def _copy_back(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return context.get_dummy_value()
 
 
+def nth(registers: Any, index: int) -> Any:
+    """The register file so many places behind this one in an array of them."""
+    kind: Any = registers.__class__
+    return kind.from_address(ctypes.addressof(registers) + index * ctypes.sizeof(kind))
+
+
+@compiles(nth, lambda registers: registers, RegistersType, types.Integer)
+def _nth(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    size = ir.Constant(WORD, ctypes.sizeof(sig.args[0].registers))
+    return builder.gep(args[0], [builder.mul(args[1], size)], source_etype=BYTE)
+
+
 def byte_at(registers: Any, offset: int) -> int:
     """Raw byte of the register memory: what a trace copies."""
     return ctypes.c_uint8.from_buffer(registers, offset).value

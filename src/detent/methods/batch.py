@@ -17,18 +17,20 @@ class Batch(Protocol):
     """A job on many machines of one axis file."""
 
     def run(
-        self, variants: Mapping[str, Numbers], machine: Machine, count: int
+        self, variants: Mapping[str, Any], machine: Machine, count: int
     ) -> tuple[dict[str, Numbers], dict[int, str]]:
         """Make the job on each.
 
-        `variants` gives each key that differs for all cases. Results by name, shape (count,), NaN where there is none,
-        and of the cases that failed why, by their places.
+        `variants` gives the values that make the machines, by key: arrays of shape (count,), or one value for all.
+        Results by name as `RunRecord.figures` has them, shape (count,), NaN where there is none, and of the cases that
+        failed why, by their places.
         """
         ...
 
 
 _MOVE = re.compile(r"^(?:move|step|after power-on)[^:]*: ")
 _VALUE = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?(?: ?[%°µ\w/*^]+)?")
+_VALUES = re.compile(r"\.\.\.(?: \.\.\.)+")
 
 
 def kind_of(failure: str) -> str:
@@ -38,10 +40,10 @@ def kind_of(failure: str) -> str:
     'not in position within ... of the end of the reference'
     """
     clause = re.split(r"[;,(]", _MOVE.sub("", failure))[0].strip()
-    return _VALUE.sub("...", clause)
+    return _VALUES.sub("...", _VALUE.sub("...", clause))
 
 
 def refusal_of(problems: Any) -> str:
-    """What kind of refusal the problems of a file are: the keys that they are about."""
-    keys = list(dict.fromkeys(problem.key for problem in problems if problem.key))
-    return f"the axis file would be refused: {', '.join(keys)}"
+    """What kind of refusal the problems of a file are: the first key that they are about."""
+    keys = [problem.key for problem in problems if problem.key]
+    return f"refused: {keys[0] if keys else 'the whole file'}"

@@ -244,8 +244,8 @@ class Method(Protocol[SpecT]):
     """Place of what its controller keeps where the machine is another than that of its file: ``kept(spec)`` gives
     values by dotted key."""
     batches: ClassVar[str] = ""
-    """Place of what makes the job on many machines of one file at once: ``Batch(file, job, keys)``, a `batch.Batch`;
-    without it each is run for itself."""
+    """Place of what makes a job on many machines of one file at once: ``Batch(spec, job)`` is a `batch.Batch`; without
+    it each is run for itself."""
     compares: ClassVar[tuple[str, ...]] = ()
     """Places of what holds it beside its alternatives: ``compare(spec, progress=)``."""
 
@@ -409,9 +409,9 @@ class Method(Protocol[SpecT]):
         """What its controller keeps where the machine is another than that of its file, by key; nothing by default."""
         return self.brought(self.keeps)(spec) if self.keeps else {}
 
-    def batch(self, file: Any, job: Any, keys: Sequence[str]) -> "Batch | None":
-        """What makes a job on many machines that differ in these keys; None where each is run for itself."""
-        return self.brought(self.batches)(file, job, keys) if self.batches else None
+    def batch(self, spec: SpecT, job: Any) -> "Batch | None":
+        """What makes a job on many machines of one file at once; None where each is run for itself."""
+        return self.brought(self.batches)(spec, job) if self.batches else None
 
     def sensors(self, spec: SpecT) -> "Mapping[str, PositionSensor]":
         """What counts the position of each of its motors; of a single one by the name ""."""

@@ -28,6 +28,7 @@ def read_gauge(r: Gauge, tick: int, x: float, velocity: float) -> None:
     r.peak_speed = max(r.peak_speed, abs(velocity))
 
 
+@step
 def set_gauge(r: Gauge, tick: int, start: float, target: float, tolerance: float) -> None:
     """A move begins: from `start` to `target`, arrived within `tolerance` [m]."""
     r.target, r.tolerance = target, tolerance

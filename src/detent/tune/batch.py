@@ -5,9 +5,13 @@ Nothing here is a closure: chunks may be made in threads, in processes of this m
 """
 
 import math
-from collections.abc import Mapping
+import os
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -17,8 +21,12 @@ from detent.errors import DetentError, InputError
 from detent.methods.batch import kind_of, refusal_of
 from detent.tune.cases import Limit, Numbers, Question, draw
 
-__all__ = ["Chunk", "Limit", "Quantity", "Question", "default_limits", "draw", "quantities", "run_chunk"]
+__all__ = [
+    "Chunk", "Limit", "Quantity", "Question", "chunks_of", "default_limits", "draw", "quantities", "run_chunk",
+    "run_chunks",
+]  # fmt: skip
 
+CHUNK, CHUNK_ALONE = 1000, 50  # cases of a chunk: of a method that makes many at once, of one that makes each alone
 DONE = "done"  # the quantity that every case has: 1 or 0
 
 
@@ -33,24 +41,12 @@ class Quantity:
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """Some cases in a row.
+    """Some cases in a row; arrays of shape (n,)."""
 
-    Attributes
-    ----------
-    first : int
-        Number of the first.
-    values : dict of str to ndarray of float64, shape (n,)
-        By key that is toleranced, SI units.
-    results : dict of str to ndarray of float64, shape (n,)
-        By quantity; of a case that failed `done` is 0 and all else NaN.
-    reason : ndarray of str, shape (n,)
-        Why a case failed: a kind, without values; empty where it did not.
-    """
-
-    first: int
-    values: dict[str, Numbers]
-    results: dict[str, Numbers]
-    reason: NDArray[np.str_]
+    first: int  # number of the first
+    values: dict[str, Numbers]  # by key that is toleranced, SI units
+    results: dict[str, Numbers]  # by quantity; of a case that failed `done` is 0 and all else NaN
+    reason: NDArray[np.str_]  # why a case failed: a kind, without values; empty where it did not
 
     @property
     def count(self) -> int:
@@ -66,23 +62,29 @@ def _nominal(question: Question) -> Any:
 
 @lru_cache(maxsize=8)
 def quantities(question: Question) -> tuple[Quantity, ...]:
-    """What is measured of each case, in order; a first run of the axis of the file tells.
-
-    Parameters
-    ----------
-    question : Question
-        What is asked.
-
-    Returns
-    -------
-    tuple of Quantity
-        `done` first.
-    """
+    """What is measured of each case, `done` first; a first run of the axis of the file tells."""
     result, spec = _nominal(question), question.file.spec
     units = dict(result.measured) | dict(result.measured_moves)
     told: Any = getattr(spec, "unit", str)
     figures = {name: value for name, value in result.figures().items() if not (result.done and math.isnan(value))}
-    return tuple(Quantity(name, told(units.get(name.split(" ")[-1], "")), value) for name, value in figures.items())
+    found = [Quantity(name, told(units.get(name.split(" ")[-1], "")), value) for name, value in figures.items()]
+    if question.margins:
+        found += [Quantity(name, _margin_unit(name), value) for name, value in _margins(question, spec).items()]
+    return tuple(found)
+
+
+def _margins(question: Question, spec: Any) -> dict[str, float]:
+    """Margins of the loops of an axis, where each is cut."""
+    found = dict[str, float]()
+    for cut, one in question.method.linear(spec).margins.items():
+        found |= {
+            f"Ms at {cut}": one.sensitivity, f"phase margin at {cut}": one.phase, f"gain margin at {cut}": one.gain,
+        }  # fmt: skip
+    return found
+
+
+def _margin_unit(name: str) -> str:
+    return "rad" if name.startswith("phase") else ""
 
 
 def default_limits(question: Question) -> tuple[Limit, ...]:
@@ -106,28 +108,85 @@ def run_case(question: Question, values: Mapping[str, float]) -> tuple[dict[str,
 
 
 def run_chunk(question: Question, first: int, count: int) -> Chunk:
-    """Make the job on some machines.
+    """Make the job on the machines from `first` on.
 
-    Parameters
-    ----------
-    question : Question
-        What is asked.
-    first, count : int
-        The first case, and how many.
-
-    Returns
-    -------
-    Chunk
-        A function of the arguments alone: the same bits wherever and in whatever pieces it is made.
+    A function of the arguments alone: the same bits wherever, and in whatever pieces, it is made.
     """
     values = draw(question, first, count)
     names = [one.name for one in quantities(question)]
-    results = {name: np.full(count, np.nan) for name in names}
-    results[DONE][:] = 0.0
-    reasons = [""] * count
+    found, reasons = make_cases(question, values, count)
+    if question.margins:
+        found |= _all_margins(question, values, reasons, count)
+    empty = np.full(count, np.nan)
+    return Chunk(
+        first, values, {name: found.get(name, empty) for name in names},
+        np.array([reasons.get(k, "") for k in range(count)], np.str_),
+    )  # fmt: skip
+
+
+def _all_margins(
+    question: Question, values: Mapping[str, Numbers], reasons: Mapping[int, str], count: int
+) -> dict[str, Numbers]:
+    """Margins of the loops of each machine that did the job."""
+    found = dict[str, Numbers]()
     for k in range(count):
-        case = {key: float(each[k]) for key, each in values.items()} if first + k else {}
-        found, reasons[k] = run_case(question, case)
-        for name in names:
-            results[name][k] = found.get(name, np.nan)
-    return Chunk(first, values, results, np.array(reasons, np.str_))
+        if k not in reasons:
+            spec = question.machine({key: float(each[k]) for key, each in values.items()}).spec
+            for name, value in _margins(question, spec).items():
+                found.setdefault(name, np.full(count, np.nan))[k] = value
+    return found
+
+
+def make_cases(
+    question: Question, values: Mapping[str, Numbers], count: int
+) -> tuple[dict[str, Numbers], dict[int, str]]:
+    """What machines with these values do: figures by name, and of those that failed why, by their places."""
+
+    def case(k: int) -> dict[str, float]:
+        return {key: float(each[k]) for key, each in values.items()}
+
+    batch = question.method.batch(question.file.spec, question.job)
+    if batch is not None:
+        return batch.run(question.variant(values), lambda k: question.machine(case(k)), count)
+    results, reasons = dict[str, Numbers](), dict[int, str]()
+    for k in range(count):
+        found, reason = run_case(question, case(k))
+        if reason:
+            reasons[k] = reason
+        for name, value in found.items():
+            results.setdefault(name, np.full(count, np.nan))[k] = value
+    return results, reasons
+
+
+# ---- many chunks
+
+
+def chunks_of(question: Question, count: int, size: int = 0) -> list[tuple[int, int]]:
+    """First case and number of cases of each chunk of so many cases."""
+    is_batch = question.method.batch(question.file.spec, question.job) is not None
+    size = size or (CHUNK if is_batch else CHUNK_ALONE)
+    return [(first, min(size, count - first)) for first in range(0, count, size)]
+
+
+def run_chunks(question: Question, chunks: Iterable[tuple[int, int]], workers: int = 0) -> Iterator[Chunk]:
+    """Make some chunks, given by first case and number of cases, side by side, and give them in their order.
+
+    Workers are threads of this process where a chunk is one compiled loop, else processes; 0: one for each core. At
+    most twice as many chunks as workers are under way.
+    """
+    workers = workers or os.cpu_count() or 1
+    is_batch = question.method.batch(question.file.spec, question.job) is not None
+    quantities(question)  # every thread finds it done, and what is compiled
+    pool = ThreadPoolExecutor(workers) if is_batch else ProcessPoolExecutor(workers, get_context("spawn"))
+    waiting, left = deque[Future[Chunk]](), iter(chunks)
+    with pool:
+        try:
+            for first, count in left:
+                waiting.append(pool.submit(run_chunk, question, first, count))
+                if len(waiting) >= 2 * workers:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for one in waiting:
+                one.cancel()

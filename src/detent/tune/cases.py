@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent import __version__
+from detent.axisfile.elementwise import is_array, nearest
 from detent.axisfile.tolerance import TABLE, Tolerance, joint, value_of
 from detent.errors import DetentError
 from detent.files.source import parse_source
@@ -52,37 +53,17 @@ class Limit:
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of many machines of one axis file; plain data, so that other processes can take it.
+    """What is asked of many machines of one axis file; plain data, so that other processes can take it."""
 
-    Attributes
-    ----------
-    name, text : str
-        The axis file as the user named it, and its text.
-    overrides : tuple of str
-        Values of ``--set``.
-    changes : tuple of (str, value)
-        Values of a program over those of the file, by dotted key.
-    job : object
-        The job, as the method reads it.
-    tolerance : tuple of Tolerance
-        What is not known, in the order of the file.
-    seed : int
-        0 to 2**64 - 1.
-    limits : tuple of Limit
-        What passes.
-    margins : bool
-        Margins of the loops are quantities, too.
-    """
-
-    name: str
-    text: str
-    overrides: tuple[str, ...]
-    changes: tuple[tuple[str, Any], ...]
-    job: Any
-    tolerance: tuple[Tolerance, ...]
-    seed: int = 1
-    limits: tuple[Limit, ...] = ()
-    margins: bool = False
+    name: str  # of the axis file as the user named it
+    text: str  # of the file
+    overrides: tuple[str, ...]  # values of ``--set``
+    changes: tuple[tuple[str, Any], ...]  # values of a program over those of the file, by dotted key
+    job: Any  # as the method reads it
+    tolerance: tuple[Tolerance, ...]  # what is not known, in the order of the file
+    seed: int = 1  # 0 to 2**64 - 1
+    limits: tuple[Limit, ...] = ()  # what passes
+    margins: bool = False  # margins of the loops are quantities, too
 
     @classmethod
     def of(
@@ -134,30 +115,30 @@ class Question:
         """Hash of all this: results of questions with the same one may be put together."""
         return hashlib.sha256(json.dumps(self.to_dict(), sort_keys=True, default=str).encode()).hexdigest()
 
-    def variant(self, values: Mapping[str, float]) -> dict[str, Any]:
-        """The values that make the machine of a case of the file, by key, whole where the key is.
+    def variant(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """What makes machines of the file: the values that a case has, or arrays of those of many, and what follows.
 
-        Beside those of the case what follows from them, and what the controller keeps though the machine is another.
+        Static friction follows Coulomb friction at its ratio, unless it has a tolerance of its own. What the controller
+        keeps, though the machine is another than that of the file, is stated.
         """
         whole = {one.key for one in self.tolerance if one.whole}
-        made: dict[str, Any] = {key: round(value) if key in whole else float(value) for key, value in values.items()}
-        if not made:
-            return made
-        return made | self._static(made) | self.method.kept(self.file.spec)
-
-    def _static(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Static friction follows Coulomb friction at its ratio, where it has no tolerance of its own."""
-        found = dict[str, float]()
+        made = {key: nearest(value) if key in whole else value for key, value in values.items()}
         for key, value in values.items():
             static = key.removesuffix("coulomb") + "static"
-            nominal = self.nominal[key]
-            if key.endswith(".coulomb") and static not in values and nominal > 0.0:
-                found[static] = value_of(self.file.spec, static) / nominal * value
-        return found
+            if key.endswith(".coulomb") and static not in values and self.nominal[key] > 0.0:
+                made[static] = _scaled(value_of(self.file.spec, static), self.nominal[key], value)
+        return self.method.kept(self.file.spec) | made
 
     def machine(self, values: Mapping[str, float]) -> AxisFile:
         """The axis file of a case; an `InputError` where it would be refused."""
-        return self.file.replaced(self.variant(values)) if values else self.file
+        return self.file.replaced(self.variant({key: float(value) for key, value in values.items()}))
+
+
+def _scaled(nominal: float, by: float, value: Any) -> Any:
+    """A value at its ratio to another; where that is as in the file, the file's."""
+    if is_array(value):
+        return np.where(value == by, nominal, nominal / by * value)
+    return nominal if value == by else nominal / by * value
 
 
 def _leaves(tables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -175,22 +156,7 @@ def _nested(leaves: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def shares(seed: int, key: str, first: int, count: int) -> Numbers:
-    """A number above 0 and below 1 of each of some cases.
-
-    Parameters
-    ----------
-    seed : int
-        0 to 2**64 - 1.
-    key : str
-        Dotted key of the axis file.
-    first, count : int
-        The first case, and how many.
-
-    Returns
-    -------
-    ndarray of float64, shape (count,)
-        One uniform number per case, an odd multiple of 2**-54.
-    """
+    """A number above 0 and below 1 of each case from `first` on, an odd multiple of 2**-54; shape (count,)."""
     own = int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "little")
     # numpy counts up before it gives the four words of a counter.
     before = (first - 1) % 2 ** (64 * WORDS)
@@ -207,19 +173,9 @@ def _at(one: Tolerance, places: Numbers) -> Numbers:
 
 
 def draw(question: Question, first: int, count: int) -> dict[str, Numbers]:
-    """Values of every toleranced key.
+    """Values of every toleranced key in the cases from `first` on, in SI units, shape (count,); case 0 is the file's.
 
-    Parameters
-    ----------
-    question : Question
-        Its seed and tolerances matter, nothing else.
-    first, count : int
-        The first case, and how many.
-
-    Returns
-    -------
-    dict of str to ndarray of float64, shape (count,)
-        By key, in SI units; case 0 has the values of the file.
+    Of the question seed and tolerances matter, nothing else.
     """
     found, own = dict[str, Numbers](), {one.key: one for one in question.tolerance}
     places = joint(own, {key: shares(question.seed, key, first, count) for key in own})

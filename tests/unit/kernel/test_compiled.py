@@ -11,7 +11,7 @@ from tests.difference import diff
 from tests.places import ROOT
 from tests.print_head_rig import Rig
 
-from detent.kernel.compiled import byte_at, copy_back, local_copy
+from detent.kernel.compiled import byte_at, copy_back, local_copy, nth
 from detent.kernel.registers import (
     Registers,
     block,
@@ -160,6 +160,21 @@ def test_byte_at_reads_raw_memory():
     w.small.c = 0xBEEF
     offset = next(leaf.offset for leaf in Whole.leaves() if leaf.path == "small.c")
     assert bytes_of(w, offset) == bytes_of.py_func(w, offset) == 0xBEEF
+
+
+@step
+def add_at(first: Whole, place: int, more: int) -> None:
+    """Write into one of several files in a row."""
+    one = nth(first, place)
+    one.small.c = one.small.c + more
+
+
+def test_a_register_file_in_an_array_is_reached_by_its_place():
+    for add in (add_at, add_at.py_func):
+        many = (Whole * 3)()
+        add(many[0], 2, 5)
+        add(many[0], 1, 70000)
+        assert [one.small.c for one in many] == [0, 70000 % 65536, 5]
 
 
 def test_registers_of_another_class_are_another_type():

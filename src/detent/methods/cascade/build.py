@@ -4,13 +4,14 @@ import math
 from typing import Any
 
 from detent.axisfile.blocks import fill_guard, fill_push, samples
+from detent.axisfile.elementwise import least, most, root, up
 from detent.axisfile.tables import HomeTable
 from detent.control.cascade_law import CascadeLawParams
 from detent.control.homing import HomingParams
 from detent.methods.cascade.controller import CascadeControllerParams
 from detent.methods.cascade.loop import machine_of
 from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec
-from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count, smoothing
+from detent.methods.cascade.system import CascadeParams, check_clocks, set_clocks, set_count, smoothing
 from detent.planning.profile import MotionLimits
 from detent.plant.linear_two_mass import fastest_rate
 
@@ -27,9 +28,18 @@ LONGEST_TICK = 1e-4  # longest tick [s]: a push begins, and a record is written,
 
 def build_cascade(spec: CascadeSpec) -> CascadeParams:
     """Parameters of the cascade axis."""
-    p, drive, period = CascadeParams(), spec.drive, spec.method.sample_period
+    p = CascadeParams()
+    fill_cascade(p, spec)
+    check_clocks(p)
+    return p
+
+
+def fill_cascade(p: Any, spec: CascadeSpec) -> None:
+    """Fill the parameters; where the specification holds arrays, those of many machines, each in columns."""
+    drive, period = spec.drive, spec.method.sample_period
     c, source, load_encoder = p.controller, p.plant.source, spec.load_encoder or IDEAL_ENCODER
-    _fill(p.plant.machine, machine_of(spec))
+    machine = machine_of(spec)
+    _fill(p.plant.machine, machine)
     source.gain = drive.voltage_gain if drive.input == "voltage" else spec.effort_per_command
     source.step, source.limit, source.delay = drive.command_step, spec.largest_command, drive.delay
     for sensor, table in ((c.motor_sensor, spec.encoder), (c.load_sensor, load_encoder)):
@@ -40,22 +50,33 @@ def build_cascade(spec: CascadeSpec) -> CascadeParams:
     c.feedback.velocity_on_load = spec.method.feedback.velocity == "load"
     _fill_law(c.law, spec)
     _fill_limits(c, spec)
-    ticks = sample_ticks(period, fastest_rate(p.plant.machine))
+    ticks = sample_ticks(period, fastest_rate(machine))
     fill_push(p.plant.push, spec.disturbance.push, period / ticks)
-    fill_clocks(p, period / ticks, ticks)
+    set_clocks(p, period / ticks, ticks)
     if spec.home is not None:
         _fill_home(p, spec, spec.home)
-    return p
 
 
-def _fill_home(p: CascadeParams, spec: CascadeSpec, home: HomeTable) -> None:
+def kept(spec: CascadeSpec) -> dict[str, float]:
+    """What the controller keeps though the machine is another than that of the file, by key.
+
+    Its feedforward reckons with the machine that it was made for, and so does its guard.
+    """
+    found = {f"method.feed_forward.model.{name}": value for name, value in spec.reckoned.items()}
+    if spec.axis.motion == "linear":
+        del found["method.feed_forward.model.pendulum"]
+    return found | {"protection.stuck_effort": spec.protection.stuck_effort}
+
+
+def _fill_home(p: Any, spec: CascadeSpec, home: HomeTable) -> None:
     """The marks of the machine lie where the file says that the axis finds them, or the hard stop does."""
     if home.by == "contact":
         stop, period = p.plant.stop, p.plant.machine.period
         stop.side, stop.place = home.side, home.position
         mass = spec.mechanics.load_mass if spec.mechanics.coupling else spec.mass
-        stop.stiffness = min(spec.largest_effort / (DEEPEST * spec.limits.travel), mass * (LARGEST_ANGLE / period) ** 2)
-        stop.damping = math.sqrt(stop.stiffness * mass)
+        rate = LARGEST_ANGLE / period
+        stop.stiffness = least(spec.largest_effort / (DEEPEST * spec.limits.travel), mass * (rate * rate))
+        stop.damping = root(stop.stiffness * mass)
         return
     marks = p.plant.home
     marks.present, marks.side, marks.edge = 1, home.side, home.position
@@ -81,7 +102,7 @@ def homing_params(spec: CascadeSpec, home: HomeTable) -> HomingParams:
 
 def sample_ticks(sample_period: float, rate: float) -> int:
     """Ticks in a sample."""
-    return max(1, math.ceil(sample_period * max(rate / LARGEST_ANGLE, 1 / LONGEST_TICK) * (1 - 1e-9)))
+    return most(1, up(sample_period * most(rate / LARGEST_ANGLE, 1 / LONGEST_TICK) * (1 - 1e-9)))
 
 
 def motion_limits(spec: CascadeSpec) -> MotionLimits:
@@ -114,7 +135,8 @@ def _fill_limits(p: CascadeControllerParams, spec: CascadeSpec) -> None:
     p.guard.following = 1
     if resolution == 0.0:  # an ideal encoder has no counts to be looked after
         p.guard.speed = p.guard.jump = p.guard.stuck = p.guard.reversed = 0
-    if p.guard.reversed:  # and one swing, in which the motor need not go where effort and force together send the axis
+    elif table.reversed_time > 0.0:
+        # And one swing, in which the motor need not go where effort and force together send the axis.
         p.guard.reversed += spec.drive.delay + spec.encoder.delay + samples(spec.swing, period)
 
 
@@ -125,10 +147,12 @@ def _fill_law(p: CascadeLawParams, spec: CascadeSpec) -> None:
     p.cascade.velocity_gain, p.cascade.integral_gain = method.velocity_gain, method.velocity_integral
     p.pid.proportional, p.pid.integral, p.pid.derivative = method.proportional, method.integral, method.derivative
     p.pid.smoothing = smoothing(method.derivative_filter, method.sample_period)
-    feed.velocity, feed.dead_band, per_command = shares.velocity, shares.dead_band, spec.effort_per_command
-    feed.acceleration = shares.acceleration * spec.mass / per_command
-    feed.viscous = shares.viscous * (spec.viscous + spec.back_emf_drag) / per_command
-    feed.coulomb_positive = shares.coulomb * spec.friction(1).coulomb / per_command
-    feed.coulomb_negative = shares.coulomb * spec.friction(-1).coulomb / per_command
-    feed.weight = shares.weight * spec.mechanics.weight / per_command
-    feed.pendulum = shares.weight * spec.mechanics.pendulum / per_command
+    known = spec.reckoned
+    per_command = known["effort_per_volt"]
+    feed.velocity, feed.dead_band = shares.velocity, shares.dead_band
+    feed.acceleration = shares.acceleration * known["mass"] / per_command
+    feed.viscous = shares.viscous * known["viscous"] / per_command
+    feed.coulomb_positive = shares.coulomb * known["coulomb_positive"] / per_command
+    feed.coulomb_negative = shares.coulomb * known["coulomb_negative"] / per_command
+    feed.weight = shares.weight * known["weight"] / per_command
+    feed.pendulum = shares.weight * known["pendulum"] / per_command

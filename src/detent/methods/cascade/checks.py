@@ -153,7 +153,7 @@ def _rate(spec: CascadeSpec) -> Iterator[Contradiction]:
         yield wrong(f"{key} mechanics.load_mass mechanics.motor_mass", allowed, remedy)
 
 
-def _ends(spec: CascadeSpec) -> tuple[float, float]:
+def ends(spec: CascadeSpec) -> tuple[float, float]:
     """What moves at the motor and at the load [kg]; all of it at both where the axis is rigid."""
     coupled = spec.mechanics.coupling is not None
     return (spec.motor_mass, spec.mechanics.load_mass) if coupled else (spec.mass, spec.mass)
@@ -161,7 +161,7 @@ def _ends(spec: CascadeSpec) -> tuple[float, float]:
 
 def _culprit(spec: CascadeSpec) -> str:
     """Key that makes the plant too fast."""
-    coupling, motor, (at_motor, at_load) = spec.mechanics.coupling, spec.motor, _ends(spec)
+    coupling, motor, (at_motor, at_load) = spec.mechanics.coupling, spec.motor, ends(spec)
     light = min(at_motor, at_load)
     rates = {"mechanics.pendulum": math.sqrt(spec.mechanics.pendulum / light)}
     for key, table in directions(spec).items():
@@ -184,7 +184,7 @@ def _drive(spec: CascadeSpec) -> Iterator[Contradiction]:
     if not _is_solid(spec):
         return
     limits, largest, remedy = spec.limits, spec.largest_command, remedy_of(spec)
-    moved = 0.5 * limits.effort / min(_ends(spec)) * spec.method.sample_period**2
+    moved = 0.5 * limits.effort / min(ends(spec)) * spec.method.sample_period**2
     if moved > limits.travel:
         here = f"here {text(moved, spec.unit('m'))}: no loop tolerates that"
         keys = "limits.effort mechanics.load_mass mechanics.motor_mass method.sample_period"

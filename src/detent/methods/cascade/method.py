@@ -39,6 +39,7 @@ class CascadeMethod(Method[CascadeSpec]):
     takes, reads = "detent.methods.moves.job:MoveJob", "detent.methods.moves.job:load_moves"
     linear_loops = "loop:linear_loops"
     tunes = "tuning:CascadeTuning"
+    keeps, batches = "build:kept", "batch:CascadeBatch"
     leaves_out = (
         "Neglected: saturation, quantization, Coulomb and Stribeck friction; both masses move, backlash is closed.",
     )
@@ -72,6 +73,10 @@ class CascadeMethod(Method[CascadeSpec]):
         """Moves, or a recording."""
         place = "replay:run_cascade_replay" if job.kind == "replay" else "run:run_cascade_moves"
         return self.brought(place)(spec, job, recorder=recorder, progress=progress)
+
+    def batch(self, spec: CascadeSpec, job: Any) -> Any:
+        """Moves on many axes at once; recordings one by one."""
+        return None if job.kind == "replay" else super().batch(spec, job)
 
     def sample_job(self, spec: CascadeSpec) -> MoveJob:
         """A short way to where there is more room."""

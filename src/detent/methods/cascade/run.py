@@ -49,7 +49,7 @@ class CascadeMove:
     overshoot: float  #: how far the load went beyond the target, 0 if it did not
     peak_speed: float  #: largest speed of the load [m/s]
     peak_following: float  #: largest magnitude of the position loop's error
-    peak_after: float  #: the same after the end of the reference; NaN if the drive went off before
+    peak_after: float = math.nan  #: the same after the end of the reference; NaN if the drive went off before
     peak_command: float  #: largest magnitude of the command [V]
     limited: float  #: time with the command at its limit [s]
     in_position: bool  #: the axis was in position in time

@@ -9,6 +9,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from detent.axisfile.elementwise import least, root
 from detent.axisfile.motion import unit_in
 from detent.axisfile.tables import (
     AxisSpec,
@@ -188,6 +189,28 @@ class FeedbackTable(Table, frozen=True):
     velocity: Literal["motor", "load"] = optional("encoder of the velocity loop", "motor")
 
 
+class FeedModelTable(Table, frozen=True):
+    """The machine as the feedforward knows it, where that is not the machine of this file."""
+
+    mass: Mass | None = optional("all masses", None, derived="of this file", ge=0.0, le=1e7)
+    viscous: Viscosity | None = optional(
+        "viscous friction, back-EMF included", None, derived="of this file", ge=0.0, le=1e9
+    )
+    coulomb_positive: Force | None = optional(
+        "Coulomb friction in the positive direction, offset included", None, derived="of this file", ge=-1e7, le=1e8
+    )
+    coulomb_negative: Force | None = optional(
+        "the same in the negative direction", None, derived="of this file", ge=-1e7, le=1e8
+    )
+    weight: Force | None = optional("load's weight along the axis", None, derived="of this file", ge=-1e7, le=1e7)
+    pendulum: Torque | None = optional(
+        "rotary: weight of a load that hangs", None, derived="of this file", ge=0.0, le=1e7
+    )
+    effort_per_volt: ForcePerVoltage | None = optional(
+        "force per volt of command", None, derived="of this file", gt=0.0, le=1e15
+    )
+
+
 class FeedForwardTable(Table, frozen=True):
     """Shares of what the reference needs by the constants of this file; 0: none, 1: all of it."""
 
@@ -205,6 +228,7 @@ class FeedForwardTable(Table, frozen=True):
         "reference speed up to which there is none against Coulomb friction", 0.0, ge=0.0, le=1e4
     )
     weight: float = optional("share of the command that holds weight and pendulum", 0.0, ge=0.0, le=2.0)
+    model: FeedModelTable | None = None
 
 
 class MethodTable(Table, frozen=True):
@@ -292,7 +316,7 @@ class CascadeSpec(AxisSpec, frozen=True):
     def swing(self) -> float:
         """Time of one swing of the load against a motor that its loop holds [s]; 0 for a rigid axis."""
         coupling, mass = self.mechanics.coupling, self.mechanics.load_mass
-        return 0.0 if coupling is None else math.tau * math.sqrt(mass / coupling.stiffness)
+        return 0.0 if coupling is None else math.tau * root(mass / coupling.stiffness)
 
     def friction(self, sense: int) -> DirectionTable:
         """Friction of motor and load together in the direction 1 or -1, offsets with it; its Stribeck curve apart."""
@@ -346,7 +370,7 @@ class CascadeSpec(AxisSpec, frozen=True):
     def max_current(self) -> float:
         """Largest current of the motor: of the amplifier, or of limits.effort if that is less [A]."""
         most = self.limits.effort / self.force_constant if self.force_constant > 0 else math.inf
-        return most if self.drive.max_current is None else min(most, self.drive.max_current)
+        return most if self.drive.max_current is None else least(most, self.drive.max_current)
 
     @property
     def effort_per_command(self) -> float:
@@ -357,6 +381,19 @@ class CascadeSpec(AxisSpec, frozen=True):
         if drive.input == "current":
             return drive.current_per_volt * self.force_constant
         return drive.voltage_gain * self.force_constant / self.motor.resistance
+
+    @property
+    def reckoned(self) -> dict[str, float]:
+        """What the feedforward reckons with, by the keys of its model: as stated there, else that of the file."""
+        stated = self.method.feed_forward.model
+        own = {
+            "mass": self.mass, "viscous": self.viscous + self.back_emf_drag,
+            "coulomb_positive": self.friction(1).coulomb, "coulomb_negative": self.friction(-1).coulomb,
+            "weight": self.mechanics.weight, "pendulum": self.mechanics.pendulum,
+            "effort_per_volt": self.effort_per_command,
+        }  # fmt: skip
+        given = {name: getattr(stated, name) for name in own} if stated else {}
+        return own | {name: value for name, value in given.items() if value is not None}
 
     @property
     def back_emf_drag(self) -> float:
@@ -370,8 +407,8 @@ class CascadeSpec(AxisSpec, frozen=True):
         """Largest magnitude of the command: of the converter, or what current and effort are limited to [V]."""
         limit = self.drive.command_limit
         if self.drive.input == "force":
-            return min(limit, self.limits.effort / self.effort_per_command)
-        return min(limit, self.max_current / self.drive.current_per_volt) if self.drive.input == "current" else limit
+            return least(limit, self.limits.effort / self.effort_per_command)
+        return least(limit, self.max_current / self.drive.current_per_volt) if self.drive.input == "current" else limit
 
     @classmethod
     def of(cls, spec: AxisSpec, file: str) -> "CascadeSpec":
@@ -392,7 +429,7 @@ class CascadeSpec(AxisSpec, frozen=True):
     def largest_effort(self) -> float:
         """Largest force at standstill [N]."""
         by_current = self.max_current * self.force_constant if self.force_constant > 0 else math.inf
-        return min(self.limits.effort, self.largest_command * self.effort_per_command, by_current)
+        return least(least(self.limits.effort, self.largest_command * self.effort_per_command), by_current)
 
 
 def fill_derived(spec: CascadeSpec) -> CascadeSpec:

@@ -10,6 +10,8 @@ sample is: the encoders latch, the controller decides, the amplifier takes over,
 and amplifier rest between samples.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -79,7 +81,21 @@ def smoothing(time_constant: float, period: float) -> float:
 
 def fill_clocks(p: CascadeParams, tick: float, sample_ticks: int) -> None:
     """Set the base tick and the period of the loops, and check what depends on them."""
+    set_clocks(p, tick, sample_ticks)
+    check_clocks(p)
+
+
+def set_clocks(p: Any, tick: float, sample_ticks: int) -> None:
+    """Set the base tick and the period of the loops."""
+    c = p.controller
+    c.sample_ticks, p.plant.machine.period = sample_ticks, tick
+    c.law.period = c.motor_sensor.period = c.load_sensor.period = tick * sample_ticks
+
+
+def check_clocks(p: CascadeParams) -> None:
+    """Refuse what depends on the clocks and does not fit them."""
     c, machine, delay = p.controller, p.plant.machine, p.plant.source.delay
+    tick, sample_ticks = machine.period, c.sample_ticks
     if not 0 <= delay < effort_source.MEMORY:
         raise ValueError(f"delay of the amplifier {delay} samples, must be 0 to {effort_source.MEMORY - 1}")
     for name, s in (("motor", c.motor_sensor), ("load", c.load_sensor)):
@@ -97,8 +113,6 @@ def fill_clocks(p: CascadeParams, tick: float, sample_ticks: int) -> None:
         raise ValueError(
             f"tick {tick:g} s, must be {MAX_RATE / rate:.3g} s or less: the plant has a rate of {rate:.4g} /s"
         )
-    c.sample_ticks, machine.period = sample_ticks, tick
-    c.law.period = c.motor_sensor.period = c.load_sensor.period = tick * sample_ticks
 
 
 def set_count(p: CascadeParams, motor: float, load: float) -> None:

@@ -110,12 +110,18 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "method.feed_forward.coulomb": ("0.5", ()),
     "method.feed_forward.dead_band": ("10 mm/s", ()),
     "method.feed_forward.weight": ("1", ("mechanics.weight=30 N",)),
+    "method.feed_forward.model.mass": ("50 kg", ()),
+    "method.feed_forward.model.viscous": ("50 N*s/m", ()),
+    "method.feed_forward.model.coulomb_positive": ("10 N", ()),
+    "method.feed_forward.model.coulomb_negative": ("10 N", ()),
+    "method.feed_forward.model.weight": ("10 N", ("mechanics.weight=30 N", "method.feed_forward.weight=1")),
+    "method.feed_forward.model.effort_per_volt": ("150 N/V", ()),
     "disturbance.push.force": ("90 N", PUSH),
     "disturbance.push.at": ("60 ms", PUSH),
     "disturbance.push.duration": ("0.1 s", PUSH),
 }
 # Keys of a rotary axis, of what is said about it, and of the host that runs it.
-ROTARY = {"axis.motion", "mechanics.pendulum"}
+ROTARY = {"axis.motion", "mechanics.pendulum", "method.feed_forward.model.pendulum"}
 SAID = {"hardware.id", "axis.name", "axis.method", "motor.max_current"}
 HOST = {"method.timeout"}
 
