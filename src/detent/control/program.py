@@ -4,6 +4,7 @@ The host lays the moves ready in a tray, some places ahead; `FEED` says how far.
 A pause brings the commanded point to rest where it is and holds it; going on leads to the same target.
 """
 
+from detent.control.move_commands import allowed_share, is_allowed
 from detent.control.operation import (
     BEYOND,
     DONE,
@@ -19,10 +20,8 @@ from detent.control.operation import (
     TRAVEL,
     Operation,
     OperationParams,
-    allowed_share,
     end_running,
     halt,
-    is_allowed,
     tell,
 )
 from detent.kernel.registers import Registers, block, f8, f8_array, i8, register, u1
