@@ -20,8 +20,9 @@ from detent.methods.moves.job import MoveJob, one_move
 from detent.tune.batch import Chunk, Question, make_cases
 from detent.tune.cases import draw
 from tests.acceptance.test_golden_bits import EXAMPLES
+from tests.cascade_rig import by_hand
 
-CASCADE = EXAMPLES / "cascade.toml"
+EXAMPLE = by_hand((EXAMPLES / "cascade.toml").read_text(encoding="utf-8"))
 SLIDE = """
 [tolerance]
 "mechanics.load_mass" = "10 %"
@@ -75,7 +76,7 @@ duration = "0.1 s"
 
 def asked(folder: Path, tolerance: str = SLIDE, job: MoveJob = MOVE, text: str = "", **more: Any) -> Question:
     """A question of the example, which begins at 100 mm, or of another text."""
-    text = text or CASCADE.read_text(encoding="utf-8").replace('"20 mm"', '"100 mm"', 1)
+    text = text or EXAMPLE.replace('"20 mm"', '"100 mm"', 1)
     file = folder / "slide.toml"
     file.write_text(text + tolerance, encoding="utf-8")
     return Question.of(detent.load(file).file, job, **more)
@@ -83,7 +84,7 @@ def asked(folder: Path, tolerance: str = SLIDE, job: MoveJob = MOVE, text: str =
 
 def quick(text: str = "") -> str:
     """A file whose axis is in position soon."""
-    text = text or CASCADE.read_text(encoding="utf-8")
+    text = text or EXAMPLE
     return text.replace("[method]\n", '[method]\nin_position_time = "1 ms"\ntimeout = "0.1 s"\n')
 
 

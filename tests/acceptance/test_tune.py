@@ -770,6 +770,25 @@ def test_29_the_spread_of_a_move(tmp_path):
 
 
 @pytest.mark.wide
+@pytest.mark.compiled
+def test_30_what_decides_the_following_error_of_the_example(tmp_path):
+    """Shares within 0.04, rank correlations within 0.05 of those of an independent program."""
+    question = asked(tmp_path)
+    results = gathered(run_chunks(question, chunks_of(question, 8192), 2))
+    told = sensitivity(draw(question, 0, 8192), results["peak_following"])
+    expected = {
+        "mechanics.friction.positive.viscous": (0.51, -0.77), "drive.current_per_volt": (0.22, 0.44),
+        "mechanics.load_mass": (0.12, -0.30), "mechanics.motor_mass": (0.03, -0.15),
+    }  # fmt: skip
+    assert told is not None
+    assert told.order[:4] == list(expected)
+    for key in told.share:
+        share, rank = expected.get(key, (0.0, 0.0))
+        assert told.share[key].value == pytest.approx(share, abs=0.04 if key in expected else 0.02)
+        assert key not in expected or told.rank[key].value == pytest.approx(rank, abs=0.05)
+
+
+@pytest.mark.wide
 @pytest.mark.parametrize("text", [CASCADE.read_text(), (EXAMPLES / "turntable.toml").read_text(), FORCE_PID])
 def test_32_arrays_build_the_bytes_of_each_file(text, tmp_path):
     made, refused = one_by_one(question := asked(tmp_path, widened(text, random.Random(1)), text=text), 334)

@@ -75,7 +75,7 @@ def kept(spec: CascadeSpec) -> dict[str, float]:
     found = {f"method.feed_forward.model.{name}": value for name, value in spec.reckoned.items()}
     if spec.axis.motion == "linear":
         del found["method.feed_forward.model.pendulum"]
-    return found | {"protection.stuck_effort": spec.protection.stuck_effort}
+    return found | {f"protection.{name}": getattr(spec.protection, name) for name in ("stuck_effort", "slip")}
 
 
 def _fill_home(p: Any, spec: CascadeSpec, home: HomeTable) -> None:
