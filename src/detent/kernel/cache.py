@@ -21,7 +21,7 @@ from pathlib import Path
 
 # What a step can be made of, beside the modules of methods that declare steps or registers; nothing else is compiled.
 STEP_ROOMS = ("control", "drive", "kernel", "operate", "plant", "planning", "sensing", "errors.py", "units.py")
-DECLARES = re.compile(r"^from detent\.kernel\.(step|registers) import", re.MULTILINE)  # a method's part of a step
+DECLARES = re.compile(r"^from detent\.kernel\.(step|registers) import", re.MULTILINE)  # parts of a step elsewhere
 PACKAGE = Path(__file__).resolve().parent.parent
 KEPT_FOLDERS = 6  # compiled folders that stay: a few checkouts and versions side by side, not every edit ever made
 OLD_PART = 3600.0  # age of a file that nobody writes any more; one takes milliseconds [s]
@@ -59,8 +59,8 @@ def step_sources() -> frozenset[Path]:
     """The files whose edits change the hash: only their functions may be cached."""
     rooms = [PACKAGE / room for room in STEP_ROOMS]
     found = [s for room in rooms for s in ([room] if room.is_file() else room.rglob("*.py"))]
-    methods = [s for s in PACKAGE.glob("methods/*/*.py") if DECLARES.search(s.read_text("utf-8"))]
-    return frozenset([*found, *methods])
+    others = [*PACKAGE.glob("methods/*/*.py"), *PACKAGE.glob("tune/*.py")]
+    return frozenset([*found, *(s for s in others if DECLARES.search(s.read_text("utf-8")))])
 
 
 @cache

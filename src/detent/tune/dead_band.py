@@ -51,6 +51,7 @@ def least_band(spec: Any, found: Standstill, most: float, progress: Progress = u
     low, high = 0.0, min(digits(found.swing + 0.5 * found.ensemble.grain, math.ceil), most)
 
     def stops(width: float) -> bool:
+        """No start of any seed hunts with a band so wide."""
         progress(min(0.1 + 0.15 * len(tried), 0.95), f"dead band {len(tried) + 1}")
         seen = list[Standstill]()
         for seed in range(found.seed, found.seed + SEEDS):

@@ -338,7 +338,7 @@ def test_compiling_is_told_once(monkeypatch):
 def test_sources_of_the_hash_are_the_rooms_a_step_can_be_made_of():
     sources = cache.step_sources()
     rooms = {source.relative_to(PACKAGE).parts[0] for source in sources}
-    assert rooms == {*cache.STEP_ROOMS, "methods"}
+    assert rooms == {*cache.STEP_ROOMS, "methods", "tune"}
     assert PACKAGE / "plant" / "drive_train.py" in sources
     assert PACKAGE / "methods" / "cascade" / "system.py" in sources
     assert PACKAGE / "methods" / "cascade" / "page.py" not in sources

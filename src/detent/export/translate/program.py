@@ -136,6 +136,7 @@ def hoisted(body: list[ast.stmt], parameters: Sequence[str]) -> list[str]:
     firsts: dict[str, tuple[tuple[Any, ...], bool]] = {}
 
     def walk(block: list[ast.stmt], path: tuple[Any, ...]) -> None:
+        """Note where each name first gets a value, by the path of branches that leads there."""
         for k, one in enumerate(block):
             parts = [("b", one.body), ("e", one.orelse)] if isinstance(one, ast.If | ast.While | ast.For) else []
             own: list[ast.AST] = [one]
@@ -289,6 +290,7 @@ class Program:
 
     def _refuse_recursion(self) -> None:
         def visit(f: Function, path: tuple[Function, ...]) -> None:
+            """Follow the calls of a step; one that is on the path already calls itself."""
             if f in path:
                 cycle = " -> ".join(one.py.__name__ for one in (*path[path.index(f) :], f))
                 refused = RefusedError("FW06", None, f"recursion: {cycle}", "calls that end", "write a loop")
@@ -334,6 +336,7 @@ class Program:
         order: list[Function] = []
 
         def visit(py: Callable[..., Any]) -> None:
+            """Put a step behind those that it calls."""
             f = self.steps[py]
             if f in order:
                 return

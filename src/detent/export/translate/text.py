@@ -131,6 +131,7 @@ def struct_texts(program: Program, files: Iterable[type[Registers]]) -> str:
     done: dict[type[Registers], str] = {}
 
     def declare(registers: type[Registers]) -> None:
+        """Write a structure behind those that it holds."""
         if registers in done:
             return
         rows: list[str] = []

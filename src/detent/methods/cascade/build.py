@@ -26,7 +26,7 @@ LAG = 1e-4  # share of the travel by which a commanded point ahead of an axis th
 CONTACT_TIME = 0.01  # for so long [s], or half as long as the guard would let it
 
 LINK_TIME = 5e-3  # within which a second word that is none is a fault [s]
-HALF_SWING = 50e-3  # longest half swing that is part of an oscillation [s]
+HALF_SWING = 0.1  # longest half swing that is part of an oscillation [s]
 
 LONGEST_TICK = 1e-4  # longest tick [s]: a push begins, and a record is written, at whole ticks
 STANDING = 0.02  # counts in a sample below which a measured velocity, as filtered, is rest

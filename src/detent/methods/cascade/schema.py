@@ -298,7 +298,7 @@ class CascadeProtectionTable(MotionProtectionTable, frozen=True):
         ge=0.0, le=1e3,
     )  # fmt: skip
     oscillation: Length = optional(
-        "position error to one side and the other in turn, ten times, each within 50 ms", math.nan,
+        "position error to one side and the other in turn, ten times, each within 100 ms", math.nan,
         derived="4 x method.in_position", ge=0.0, le=1e3,
     )  # fmt: skip
     thermal_time: Time = optional(
