@@ -94,7 +94,7 @@ bench-smoke: venv-test ## run every benchmark once, without measuring
 BLOCKS   := $(addprefix tests/unit/,control drive planning plant sensing)
 STEPS    := $(BLOCKS) $(addprefix tests/unit/,kernel $(addprefix operate/test_,drivers.py loop.py watchdog.py)) \
             $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py live.py plant.py system*.py))
-WHOLE    := tests/unit/methods tests/unit/identify
+WHOLE    := $(addprefix tests/unit/,methods identify cli export tune)
 PANEL    := _49_ or _50_ or _51_ or _52_ or _53_
 SEEN     := not long and not wide and not bench and not process
 COVER    := $(BIN)/python -m coverage run -m pytest $(PYTEST_ARGS)
