@@ -119,7 +119,7 @@ def resident(*processes: int) -> int:
 
 def soak(folder: Path, warm: float, seconds: float) -> dict[str, float]:
     """Jogs, moves, a page with eight channels, and others that come and go; growth of memory after `warm` [1]."""
-    live = Live(folder, "--period", "10 ms", "--json")
+    live = Live(folder / "slide.toml", "--period", "10 ms", "--json")
     browser, left = entered(json.loads(live.out.readline())["panel"][0]), threading.Event()
     processes, held, rounds, begin = (live.process.pid, live.panel_id()), 0, 0, time.monotonic()
     with browser.socket() as socket, browser.socket() as page, detent.connect(live.file) as axis:
