@@ -64,7 +64,7 @@ OLDEST  := $(addprefix tests/unit/,axisfile cli files page record test_axis.py t
            $(wildcard tests/unit/test_cli*.py $(addprefix tests/unit/methods/,*.py */test_schema.py */test_build.py))
 test-lowest: venv-dev ## files, pages, commands and a run of each method, with the oldest dependencies allowed
 	$(BIN)/uv venv --quiet --clear --seed --python '$(PYTHON)' $(LOWEST)
-	$(BIN)/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct --only-binary :all: --editable '.[test]'
+	$(BIN)/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct --only-binary :all: --editable '.[oldest]'
 	$(LOWEST)/bin/python -m pytest $(WHOLE_FILES) -p no:benchmark \
 	    -m "not long and not wide and not process" -W default::DeprecationWarning $(OLDEST) $(PYTEST_ARGS)
 

@@ -19,6 +19,7 @@ from detent.identify.fit.verdict import Refusal
 from detent.identify.remarks import remarks_of
 from detent.identify.write.file_numbers import Contrast, contrasts
 from detent.identify.write.outputs import axis_toml, cascade_spec, excitation_job, patched_axis
+from detent.logs.differences import with_position
 from detent.logs.log import Log
 from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec
@@ -283,7 +284,8 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     Raises
     ------
     InputError
-        A log, the mapping or the axis file cannot be read, or a log holds no position or nothing that drives the axis.
+        A log, the mapping or the axis file cannot be read, or a log holds neither position nor velocity, or nothing
+        that drives the axis.
     DetentError
         The axis file is of another method.
     """
@@ -295,7 +297,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     read: list[Log] = []
     for number, path in enumerate(paths):
         tell(0.1 * number / len(paths), f"reading {Path(path).name}")  # the first tenth of the work
-        read.append(read_log(path, mapping, columns))
+        read.append(with_position(read_log(path, mapping, columns)))
 
     def report(stage: str, share: float) -> None:
         begin, end, text = _STAGES.get(stage, (0.4, 0.8, stage))

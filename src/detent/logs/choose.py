@@ -6,7 +6,7 @@ import numpy as np
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import did_you_mean, short
-from detent.logs.headings import BITS, ROLES, Conversion, find_conversion, rank, split_heading, words_of
+from detent.logs.headings import BITS, EFFORTS, ROLES, Conversion, find_conversion, rank, split_heading, words_of
 from detent.logs.log import Action, Draft, Kind, Severity, Source
 from detent.logs.mapping import Choice, ColumnMapping
 from detent.logs.raw_table import RawTable, tell
@@ -88,9 +88,25 @@ def _guess(table: RawTable, chosen: Chosen, silent: set[str]) -> None:
         if len(fitting) == 1 and role not in chosen and role not in silent:
             chosen[role] = fitting[0]
             table.notes.append(f'{role}: column "{short(fitting[0])}", by its unit {table.units[fitting[0]]}')
+    _guess_share(table, chosen, silent)
     rest = [short(name) for name in _free(table, chosen)]
     if rest:
         table.notes.append(f"columns not used: {tell(rest)}")
+
+
+def _guess_share(table: RawTable, chosen: Chosen, silent: set[str]) -> None:
+    """Take a torque, a current or a force in per cent of a rating that nothing states as the word to the drive."""
+    if chosen.keys() & set(EFFORTS) or "command" in silent:
+        return
+    for role in EFFORTS:
+        for name in _free(table, chosen):
+            plain = split_heading(name)[0]
+            if role not in silent and _fits_unit(table.units[name], "command") and rank(plain, role) is not None:
+                chosen["command"] = name
+                rating = f"{role}={short(plain)} [{table.units[name]} of 2.4 {ROLES[role].units[0]}]"
+                told = f"a {role} in {table.units[name]}: its rating is stated as in {rating}"
+                table.notes.append(f'command: column "{short(name)}", {told}')
+                return
 
 
 def _free(table: RawTable, chosen: Chosen) -> list[str]:

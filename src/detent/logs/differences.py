@@ -1,12 +1,13 @@
 """What the physics checks compare: changes of a signal over windows, derivatives, and how alike two series are."""
 
+from dataclasses import replace
 from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.logs.log import Values
+from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
 
 QUANTA = 20.0  # times its grain by which a position should change over a window for rounding and noise not to count
@@ -62,6 +63,25 @@ def smooth(values: Values, t: Values, rows: int) -> tuple[NDArray[np.int64], NDA
 def integral(values: Values, t: Values) -> Values:
     """Integral over time by trapezoids, 0 at the first sample, shape (n,)."""
     return np.r_[0.0, np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(t))]
+
+
+def with_position(log: Log) -> Log:
+    """The log, with the integral of its velocity for a position where it has no other; 0 at its first sample.
+
+    An offset of the velocity becomes a steady drift of the position, its noise a random walk: neither changes what
+    accelerations and speeds say, but a force that depends on the place cannot be seen.
+    """
+    if "position" in log.signals or "velocity" not in log.signals:
+        return log
+    source, unit = log.columns["velocity"], log.units["velocity"].removesuffix("/s")
+    told = "position: none recorded, the integral of the velocity is taken, 0 at the first sample"
+    return replace(
+        log,
+        signals=log.signals | {"position": integral(log.signals["velocity"], log.t)},
+        units=log.units | {"position": unit},
+        columns=log.columns | {"position": replace(source, column=f"integral of {source.column}")},
+        guesses=(*log.guesses, told),
+    )
 
 
 def paired_changes(position: Values, velocity: Values, t: Values) -> tuple[Values, Values]:

@@ -1,11 +1,13 @@
 """What headings of recordings say: units, turned into factors to SI, and what a column can be.
 
 A unit may carry a number: ``"0.3125 um"`` says that one unit of the column is 0.3125 µm, as for a column of encoder
-counts. Counts themselves (``count``, ``steps``, ``pulses``) stay counts where nothing says how long one is.
+counts. Counts themselves (``count``, ``steps``, ``pulses``) stay counts where nothing says how long one is. A share of
+a rating is one of a stated value: ``"% of 2.4 N*m"``, ``"‰ of 5 A"``.
 """
 
 import difflib
 import re
+import unicodedata
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -27,6 +29,7 @@ _WRITTEN_AS = {
 }  # fmt: skip
 """Ways of writing units that are common in headings, and what the parser of units calls them."""
 
+_SHARE = re.compile(r"(%|‰|per ?mille|per ?cent) of (.+)", re.IGNORECASE)
 _NO_UNIT = frozenset({"", "-", "1", "none", "lsb", "raw", "pu", "p.u."})
 BITS = re.compile(r"([0-9]{1,2}) ?bits?", re.IGNORECASE)
 _NUMBERED = re.compile(r"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)\s*(.*)", re.DOTALL)
@@ -34,8 +37,8 @@ _OF_TURNS = re.compile(r"rad|deg|turn|rpm|revol|arc|grad")
 _GRAVITIES = frozenset({"g", "g0", "gn"})
 _CELSIUS, _FAHRENHEIT = (1.0, 273.15), (5 / 9, 459.67 * 5 / 9)
 _TEMPERATURES = {"K": (1.0, 0.0), "degC": _CELSIUS, "C": _CELSIUS, "degF": _FAHRENHEIT, "F": _FAHRENHEIT}
-_BRACKETED = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*", re.DOTALL)
-_AFTER_NAME = (re.compile(r"(.*?\S)\s*[/,]\s*(\S+)"), re.compile(r"(.*\S)[_ ](\S+)"))
+_BRACKETED = re.compile(r"(.*?)\s*[\[(（［【]\s*([^\[\]()（）［］【】]*?)\s*[\])）］】]\s*", re.DOTALL)
+_AFTER_NAME = (re.compile(r"(.*?\S)(?:\s*[/,]\s*| in | en )(\S+)"), re.compile(r"(.*\S)[_ ](\S+)"))
 _SUFFIXES = frozenset(
     {"s", "ms", "us", "ns", "sec", "m", "mm", "um", "nm", "cm", "in", "rad", "deg", "rpm", "turn", "rev", "V", "mV",
      "A", "mA", "N", "Nm", "mNm", "K", "degC", "rads", "rad_s", "deg_s", "m_s", "mm_s", "um_s", "m_s2", "usec", "msec",
@@ -58,10 +61,38 @@ _MARKS = {
     "enabled": {"enable", "enabled"},
 }
 
-_ANY = frozenset({"actual", "measured", "measured motor", "istwert"})
+_ANY = frozenset({"actual", "measured", "measured motor"})
 """Names that fit every measured signal: they say position where nothing else in a heading says more."""
 
-_TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
+_TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+|[^\W\d_a-zA-Z]+")
+_SAID_AS = {
+    "time": "zeit zeitpunkt tiempo temps tempo 时间 時間 时刻",
+    "timestamp": "zeitstempel horodatage 时间戳",
+    "position": "lage weg posicion posizione 位置 位移",
+    "angle": "winkel angulo angolo 角度 转角",
+    "velocity": "geschwindigkeit drehzahl velocidad vitesse velocita 速度 转速 回転数",
+    "acceleration": "beschleunigung aceleracion accelerazione 加速度",
+    "force": "kraft fuerza forza 推力",
+    "torque": "drehmoment couple par coppia 转矩 扭矩 力矩 トルク",
+    "current": "strom corriente courant corrente intensite intensidad 电流 電流",
+    "voltage": "spannung tension voltaje tensione 电压 電圧",
+    "temperature": "temperatur temperatura 温度",
+    "command": "stellgrosse stellgroesse stellwert commande comando 控制量 占空比",
+    "actual": "ist istwert reel reelle real reale actuel actuelle 实际 実",
+    "measured": "gemessen gemessene mesure mesuree medida medido misurata 测量",
+    "target": "soll ziel cible objetivo obiettivo 目标 目標",
+    "setpoint": "sollwert consigne consigna 设定 给定 指令",
+    "motor": "moteur motore 电机 モータ",
+    "load": "last charge carga carico 负载",
+    "encoder": "geber codeur codificador 编码器",
+    "enabled": "freigabe habilitado 使能",
+    "error": "schleppfehler schleppabstand regelabweichung fehler erreur ecart desviacion 误差 偏差",
+    "value": "wert valor valeur valore 值",
+}  # fmt: skip
+"""Words of headings in German, Spanish, French, Italian, Chinese and Japanese, without accents, by ours."""
+_OURS = {word: ours for ours, said in _SAID_AS.items() for word in said.split()}
+# Words that are written together, as in Lageistwert or 实际位置: known ones all through, the longest first.
+_PARTS = re.compile("|".join(sorted({*_OURS, *_SAID_AS, "regler"}, key=len, reverse=True)))
 _LEAST_FUZZY = 6
 
 
@@ -110,17 +141,23 @@ def find_conversion(text: str, unit: str) -> Conversion | None:
     Conversion(unit='m', factor=0.0005, offset=0.0)
     >>> find_conversion("steps", "count"), find_conversion("steps", "m")
     (Conversion(unit='count', factor=1.0, offset=0.0), None)
+    >>> find_conversion("% of 2.5 N*m", "N*m")
+    Conversion(unit='N*m', factor=0.025, offset=0.0)
     """
     match = _NUMBERED.fullmatch(text.strip())
     number, name = (match[1], match[2]) if match else ("1", text.strip())
     if len(text) > MAX_TEXT:
         return None
+    if share := _SHARE.fullmatch(name):
+        rated = find_conversion(share[2].strip(), unit)
+        hundred = 100 if share[1] == "%" or "cent" in share[1].lower() else 1000
+        return rated and rated._replace(factor=float(number) * rated.factor / hundred)
     name = _WRITTEN_AS.get(name, name).replace("µ", "u").replace("μ", "u").replace("°", "deg")
     if unit == "K":  # steps of several degrees do not exist
         return Conversion("K", *_TEMPERATURES[name]) if name in _TEMPERATURES and float(number) == 1 else None
     if unit == "":
         as_it_stands = float(number) if name.lower() in _NO_UNIT else None
-        factor = {"%": float(number) / 100, "bits": 1.0}.get(name, as_it_stands)
+        factor = {"%": float(number) / 100, "‰": float(number) / 1000, "bits": 1.0}.get(name, as_it_stands)
     elif unit.startswith("count"):
         head, slash, rest = name.partition("/")
         factor = float(number) if head.lower() in COUNT_WORDS and f"count{slash}{rest}" == unit else None
@@ -151,24 +188,24 @@ class Role:
 ROLES: dict[str, Role] = {
     role.name: role
     for role in (
-        Role("time", "time", ("s",), ("t", "time", "timestamp", "time stamp", "stamp", "zeit", "elapsed", "clock")),
+        Role("time", "time", ("s",), ("t", "time", "timestamp", "time stamp", "stamp", "ts", "elapsed", "clock")),
         Role("reference", "position asked for", _MOTION[0],
              ("reference position", "position reference", "pos ref", "position ref", "ref", "reference", "setpoint",
-              "set point", "sollwert", "goal position", "target position", "demand position", "goal", "target",
+              "set point", "goal position", "target position", "demand position", "goal", "target",
               "desired", "demand", "commanded position", "position command", "qg", "qref", "xref")),
         Role("position_load", "position by a second encoder, at the load", _MOTION[0],
              ("load position", "position load", "load encoder", "encoder load", "enc load", "load angle", "enc 2",
               "encoder 2", "enc2", "position 2", "pos 2", "encoder2", "pos2")),
         Role("position", "position as measured", _MOTION[0],
              ("position meas", "measured position", "actual position", "position", "pos", "enc", "encoder", "angle",
-              "theta", "phi", "measured", "measured motor", "actual", "istwert", "enc1", "encoder1", "pos1", "qm", "q",
-              "x")),
+              "theta", "phi", "readback", "rbv", "measured", "measured motor", "actual", "enc1", "encoder1", "pos1",
+              "qm", "q", "x")),
         Role("velocity", "velocity as measured", _MOTION[1],
              ("velocity meas", "measured velocity", "actual velocity", "velocity", "speed", "vel", "omega", "rpm", "qd",
               "dq", "v")),
         Role("acceleration", "acceleration as measured", _MOTION[2], ("acceleration", "accel", "acc", "qdd", "ddq")),
         Role("force", "force of the drive on the axis", ("N",), ("motor force", "force", "thrust")),
-        Role("torque", "torque of the motor", ("N*m",), ("motor torque", "torque", "tau", "moment", "drehmoment")),
+        Role("torque", "torque of the motor", ("N*m",), ("motor torque", "torque", "tau", "moment")),
         Role("current", "current of the motor", ("A",), ("motor current", "current", "iq", "i q", "amps", "i")),
         Role("supply", "voltage that supplies the drive", ("V",),
              ("supply", "supply voltage", "bus voltage", "vbus", "v bus", "dc link", "input volts", "input voltage",
@@ -191,8 +228,19 @@ def words_of(name: str) -> tuple[str, ...]:
 
     >>> words_of("inputSignal"), words_of("goal_position"), words_of("enc1")
     (('input', 'signal'), ('goal', 'position'), ('enc', '1'))
+    >>> words_of("Lageistwert"), words_of("Vitesse mesurée"), words_of("实际位置")
+    (('position', 'actual'), ('velocity', 'measured'), ('actual', 'position'))
     """
-    return tuple(token.lower() for token in _TOKEN.findall(name))
+    letters = unicodedata.normalize("NFKD", name).replace("ß", "ss")
+    plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
+    return tuple(word for token in _TOKEN.findall(plain) for word in _in_our_words(token.lower()))
+
+
+def _in_our_words(token: str) -> list[str]:
+    """Our words for one of another language, or for several that are written together; otherwise the word itself."""
+    parts: list[str] = _PARTS.findall(token)
+    is_whole = sum(map(len, parts)) >= len(token) - ("s" in token)  # German joins with an s
+    return [_OURS.get(part, part) for part in parts] if parts and is_whole else [token]
 
 
 def rank(name: str, role: str) -> int | None:

@@ -2,7 +2,7 @@
 
 import importlib
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,10 @@ _UNIT_NAMES = ("unit", "units", "Unit", "Units")
 
 
 def read_mat(path: Path, options: FileOptions) -> raw_table.RawTable:
-    """Read a MATLAB file, of version 7.3 as HDF5; names in structures, or in that of ``table``, joined by points."""
+    """Read a MATLAB file, of version 7.3 as HDF5; names in structures, or in that of ``table``, joined by points.
+
+    Tables and timetables are objects, which mat-io reads, where it is installed.
+    """
     check_file(path, MAX_BYTES, ALLOWED_MAT)
     with raw_table.whole(path, "MATLAB", ALLOWED_MAT, "save it again with save -v7, or as CSV"):
         try:
@@ -38,9 +41,45 @@ def read_mat(path: Path, options: FileOptions) -> raw_table.RawTable:
                 most = f"{ALLOWED_MAT}, up to {raw_table.MAX_CELLS} numbers"
                 raise InputError.of_file(str(path), f"{cells} numbers", most, "split the recording")
             found: dict[str, Any] = scipy("io").loadmat(path, squeeze_me=True, struct_as_record=True)
+        except TypeError:  # an object has no shape
+            return _read_objects(path, options)
         except NotImplementedError:
-            return read_hdf5(path, options)
+            return _read_objects(path, options) if _holds_objects(path) else read_hdf5(path, options)
     items = [item for name, value in found.items() if not name.startswith("__") for item in _fields(name, value, 0)]
+    return raw_table.table_of(str(path), _inside(str(path), items, options.table), ALLOWED_MAT)
+
+
+def _holds_objects(path: Path) -> bool:
+    """True for a file of version 7.3 with tables or other objects of MATLAB."""
+    h5py: Any = importlib.import_module("h5py")
+    with h5py.File(path) as file:
+        return any("MATLAB_object_decode" in file[name].attrs for name in file if not name.startswith("#"))
+
+
+def _read_objects(path: Path, options: FileOptions) -> raw_table.RawTable:
+    """Read tables and timetables of MATLAB; the times of the rows of a timetable are its time."""
+    try:
+        matio: Any = importlib.import_module("matio")
+    except ImportError:
+        got = "a table or another object of MATLAB, which needs mat-io, which is not installed"
+        remedy = (
+            'pip install "detent[matlab]", or in MATLAB: s = table2struct(T, "ToScalar", true); save it with -struct'
+        )
+        raise InputError.of_file(str(path), got, ALLOWED_MAT, remedy) from None
+    items: list[raw_table.Item] = []
+    found = matio.load_from_mat(str(path), add_table_attrs=True)
+    is_alone = len(found) == 1 and not options.table
+    for name, value in found.items():
+        if not hasattr(value, "columns"):
+            items += _fields(name, value, 0)
+            continue
+        prefix = "" if is_alone else f"{name}."
+        units = np.ravel(value.attrs.get("VariableUnits", ())).tolist() or [""] * value.shape[1]
+        if value.index.dtype.kind in "mM":
+            items.append(raw_table.Item(f"{prefix}time", value.index.to_numpy()))
+        for column, unit in zip(value.columns, units, strict=False):
+            stated = str(unit) or split_heading(str(column))[1]
+            items.append(raw_table.Item(f"{prefix}{column}", value[column].to_numpy(), stated))
     return raw_table.table_of(str(path), _inside(str(path), items, options.table), ALLOWED_MAT)
 
 
@@ -123,13 +162,31 @@ def _fields(name: str, value: Any, depth: int) -> Iterator[raw_table.Item]:
     """What a value of a MATLAB file holds: fields of a structure under names joined by points."""
     kind: np.dtype[Any] | None = getattr(value, "dtype", None)
     if kind is not None and kind.names:
-        if kind.hasobject and (value.size != 1 or depth >= _DEEPEST):
+        if kind.hasobject and depth >= _DEEPEST:
+            return
+        if kind.hasobject and (labels := _labelled(kind.names)):
+            for number, element in enumerate(value.reshape(-1), start=1):
+                label = str(element[labels[0]] if np.size(element[labels[0]]) else "") or f"{name}.{number}"
+                yield raw_table.Item(label, element[labels[1]], split_heading(label)[1])
+            return
+        if kind.hasobject and value.size != 1:
             return
         record: Any = value.reshape(-1)[0] if kind.hasobject else value
+        if name.rpartition(".")[2] == "X" and kind.names == ("Data",):  # the axis of what a recorder took
+            yield raw_table.Item("time", record["Data"])
+            return
         for field in kind.names:
             yield from _fields(f"{name}.{field}" if name else field, record[field], depth + 1)
     else:
         yield raw_table.Item(name, value, split_heading(name)[1])
+
+
+def _labelled(names: Sequence[str]) -> tuple[str, str] | None:
+    """Fields with the name and the samples of structures of which each is a signal, as recorders write them."""
+    for pair in (("Name", "Data"), ("label", "values"), ("name", "data"), ("Name", "Values")):
+        if set(pair) <= set(names):
+            return pair
+    return None
 
 
 def _inside(file: str, items: list[raw_table.Item], table: str) -> list[raw_table.Item]:
@@ -166,6 +223,8 @@ def _read_file(path: str, file: Any, wanted: str) -> tuple[list[raw_table.Item],
     """Datasets of the chosen group with their names inside it, and what had to be chosen."""
     h5py: Any = importlib.import_module("h5py")
     found = list(_datasets(file, 0, {int(h5py.h5o.get_info(file.id).addr)}))
+    if not wanted and (recorded := list(_recorded(file, found))):
+        return recorded, []
     groups: dict[str, list[Any]] = {}
     for dataset in found:
         groups.setdefault(dataset.name.strip("/").rpartition("/")[0], []).append(dataset)
@@ -190,6 +249,28 @@ def _read_file(path: str, file: Any, wanted: str) -> tuple[list[raw_table.Item],
         )
     attributes = [raw_table.Item(str(name), value) for name, value in file.attrs.items()]
     return [*_in_order(file, chosen, taken), *map(_item, singles), *attributes], notes
+
+
+def _recorded(file: Any, found: list[Any]) -> Iterator[raw_table.Item]:
+    """Signals of structures with Name and Data, which MATLAB keeps as references, and the time in the field X beside.
+
+    Followed are only references, which lead nowhere but into the file itself.
+    """
+    h5py: Any = importlib.import_module("h5py")
+    refers = {dataset.name: dataset for dataset in found if h5py.check_ref_dtype(dataset.dtype) is h5py.Reference}
+    for path, data in refers.items():
+        head, _, field = path.rpartition("/")
+        names = refers.get(f"{head}/Name")
+        if field != "Data" or names is None or names.size != data.size:
+            continue
+        times = file.get(f"{head.rpartition('/')[0]}/X/Data")
+        if isinstance(times, h5py.Dataset) and _is_vector(times):
+            yield raw_table.Item("time", times[()])
+        pairs: list[tuple[Any, Any]] = list(zip(np.ravel(names[()]).tolist(), np.ravel(data[()]).tolist(), strict=True))
+        for name, values in pairs:
+            label = "".join(map(chr, np.ravel(file[name][()]).tolist())) if name else ""
+            if values and _is_vector(file[values]):
+                yield raw_table.Item(label, file[values][()], split_heading(label)[1])
 
 
 def _datasets(group: Any, depth: int, seen: set[int]) -> Iterator[Any]:

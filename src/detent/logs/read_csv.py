@@ -58,6 +58,7 @@ def read_csv(path: Path, options: FileOptions) -> RawTable:
     text = decode(path, read_bytes(path, MAX_BYTES, ALLOWED), table)
     lines = lines_of(text if "\n" in text else text.replace("\r", "\n"))  # old programs end a line in CR alone
     try:
+        lines = _unquoted(table, lines)
         layout = guess_layout(table, lines, options)
         numbers = [index for index in range(layout.first, len(lines)) if is_telling(lines[index])]
         check_size(table.file, len(numbers), len(layout.names))
@@ -86,6 +87,20 @@ def decode(path: Path, data: bytes, table: RawTable) -> str:
     except UnicodeDecodeError:
         table.notes.append("not UTF-8: read as Windows-1252")
         return data.decode("cp1252", "replace")
+
+
+def _unquoted(table: RawTable, lines: list[str]) -> list[str]:
+    """Lines without the one pair of quotation marks around each that a spreadsheet leaves which took rows for cells."""
+    sample = [line for line in lines if is_telling(line)][:SAMPLE_LINES]
+    if not sample or not all(line[0] == line.rstrip()[-1] == '"' for line in sample):
+        return lines
+    if any(len(cells) != 1 for separator in "\t;,|" for cells in csv.reader(sample, delimiter=separator)):
+        return lines
+    inside = list(csv.reader(lines))
+    if not any(separator in cells[0] for cells in inside for separator in "\t;,|" if cells):
+        return lines
+    table.notes.append("quotation marks around whole lines left out")
+    return ["".join(cells) for cells in inside]
 
 
 def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: list[int]) -> None:
@@ -264,7 +279,17 @@ def _width(rows: Sequence[Sequence[str]]) -> int:
 
 def _first_data(rows: Sequence[Sequence[str]], width: int) -> int | None:
     """Index of the first row of numbers: of the usual width, as is the next; numbers alone may be fewer before it."""
-    data = [len(cells) == width and _numbers(cells) >= max(1, width / 2) for cells in rows]
+    full = [cells for cells in rows if len(cells) == width]
+    later = full[len(full) // 2 :]  # which columns hold numbers, the later rows say: no header is among them
+    numeric = [index for index in range(width) if 2 * _numbers([cells[index] for cells in later]) >= len(later)]
+
+    def is_data(cells: Sequence[str]) -> bool:
+        """True where fewer than half of the cells that should be numbers are words; empty ones are none."""
+        known = [cells[index] for index in numeric]
+        words = sum(cell.lower() not in MISSING for cell in known) - (numbers := _numbers(known))
+        return numbers > 0 and 2 * words < len(known)
+
+    data = [len(cells) == width and is_data(cells) for cells in rows]
     place = next((place for place, ok in enumerate(data) if ok and all(data[place + 1 : place + 2])), None)
     while place and len(rows[place - 1]) >= width / 2 and _numbers(rows[place - 1]) == len(rows[place - 1]):
         place -= 1
@@ -286,10 +311,11 @@ def _read_header(table: RawTable, lines: Sequence[str], layout: CsvLayout, state
         above = [stated - 1] if stated else []
     rows = [_cells(lines[index], layout.separator) for index in above]
     units: list[str] = []
-    # A row of nothing but units, such as ``[s];[mm]``; some columns may have none.
-    telling = [cell.strip("[]() ") for cell in (rows[-1] if rows else ()) if cell.strip("[]() -")]
-    is_units = bool(telling) and all(map(is_unit, telling))
-    if stated is None and len(rows) > 1 and is_units and len(rows[-2]) >= len(rows[-1]) > 1:
+    if stated is None and _is_by_channel(rows, width):
+        rows, units = _by_channel(table, rows)
+    if stated is None and len(rows) > 2 and not _is_units(rows[-1]) and _is_units(rows[-2]):
+        rows.pop()  # what each column is in words, below its name and its unit
+    if stated is None and len(rows) > 1 and _is_units(rows[-1]) and len(rows[-2]) >= len(rows[-1]) > 1:
         units = [cell.strip("[]() ") for cell in rows.pop()]
     # A line above the numbers that is much narrower than they are is no header but a remark.
     names = rows[-1] if rows and (stated or len(rows[-1]) >= max(1, (width + 1) // 2)) else []
@@ -304,6 +330,27 @@ def _read_header(table: RawTable, lines: Sequence[str], layout: CsvLayout, state
         name = names[index] if index < len(names) else ""
         layout.names.append(name or f"column {index + 1}")
         layout.units.append(split_heading(name)[1] or (units[index] if index < len(units) else ""))
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    """True for a row of nothing but units, such as ``[s];[mm]``; some columns may have none."""
+    telling = [cell.strip("[]() ") for cell in cells if cell.strip("[]() -")]
+    return len(cells) > 1 and bool(telling) and all(map(is_unit, telling))
+
+
+def _is_by_channel(rows: Sequence[Sequence[str]], width: int) -> bool:
+    """True for lines that say of each channel, a pair of columns of time and value, one property: its key, then it."""
+    pairs = [row for row in rows if len(row) > width - 2 and len(set(row[0::2])) == 1 and row[0]]
+    return width > 1 and width % 2 == 0 and len(pairs) > 1 and any(row[0].casefold() == "name" for row in pairs)
+
+
+def _by_channel(table: RawTable, rows: Sequence[Sequence[str]]) -> tuple[list[list[str]], list[str]]:
+    """Names and units of channels, as the exports of PLC scopes have them: of times in ms, and of values."""
+    stated = {row[0].casefold(): row[1::2] for row in rows if len(set(row[0::2])) == 1}
+    names, units = stated["name"], stated.get("unit", [])
+    table.notes.append("pairs of columns: the time in ms and the value of each channel")
+    filled = [*units, *[""] * (len(names) - len(units))]
+    return [[cell for name in names for cell in ("time", name)]], [cell for unit in filled for cell in ("ms", unit)]
 
 
 def _cells(line: str, separator: str) -> list[str]:

@@ -21,6 +21,7 @@ Record = dict[str, Any]
 
 _LINES = (".jsonl", ".ndjson")
 _MOST_BROKEN = 0.2
+_SYSID_UNITS = {"Meters": "m", "Feet": "ft", "Inches": "in", "Radians": "rad", "Degrees": "deg", "Rotations": "turn"}
 
 
 def read_json(path: Path, options: FileOptions) -> RawTable:
@@ -53,6 +54,8 @@ def _from_object(file: str, found: Any, name: str) -> RawTable:
     """Read an object: the records it holds under some name, or lists by their names."""
     items: Record = {item.name: item.value for item in flatten("", found) if item.name}
     lists = [key for key, value in items.items() if _is_records(value)]
+    if items.get("sysid") is True and not name:
+        return _characterisation(file, items, lists)
     inside = {key.removeprefix(f"{name}."): value for key, value in items.items() if key.startswith(f"{name}.")}
     if name and name not in lists and not inside:
         raise no_table(file, name, lists, "none: it holds no lists of records")
@@ -63,6 +66,22 @@ def _from_object(file: str, found: Any, name: str) -> RawTable:
     table = _from_records(file, items[chosen], {key: value for key, value in items.items() if key not in lists})
     others = [key for key in lists if key != chosen]
     table.notes += [f"list {chosen} read, not {', '.join(others)}"] if others and not name else []
+    return table
+
+
+def _characterisation(file: str, items: Record, lists: list[str]) -> RawTable:
+    """Read the tests of WPILib's SysId as one recording: rows of time, voltage, position and velocity in each list.
+
+    A drivetrain has two sides, and the angle and the angular rate of its chassis behind them.
+    """
+    rows = sorted((row for key in lists for row in items[key]), key=lambda row: row[0] if row else 0)
+    unit = _SYSID_UNITS.get(str(items.get("units")), "")
+    sides = ["left", "right"] if rows and len(rows[0]) == 9 else [""]
+    signals = [("voltage", "V"), ("position", unit), ("velocity", f"{unit}/s" if unit else "")]
+    named = [f"{signal} {side}".strip() + (f" [{said}]" if said else "") for signal, said in signals for side in sides]
+    names = ["time [s]", *named, *(["heading", "heading rate"] if len(sides) == 2 else [])]
+    table = _from_records(file, [names, *rows], {key: value for key, value in items.items() if key not in lists})
+    table.notes.append(f"tests read as one recording: {', '.join(lists)}")
     return table
 
 
