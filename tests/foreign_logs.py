@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 import pandas as pd
-from matio import save_to_mat
 from scipy.io import savemat
 
 TRUTH = {"mass": 2.0, "viscous": 6.0, "coulomb": 1.5}  # in A s^2/m, A s/m, A
@@ -30,9 +29,9 @@ class Motion(NamedTuple):
     reference: np.ndarray  # m
 
 
-def motion(n: int = 8000, dt: float = 0.001) -> Motion:
+def motion(n: int = 8000, dt: float = 0.001, coulomb: float = TRUTH["coulomb"], seed: int = 5) -> Motion:
     """A motion with reversals and many accelerations, a current that drives it, noise in what is measured."""
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(seed)
     t = np.arange(n) * dt
     velocity, acceleration, position = np.zeros(n), np.zeros(n), np.zeros(n)
     for frequency, amplitude in ((0.25, 0.06), (0.7, 0.02), (1.9, 0.004), (3.1, 0.0015)):
@@ -40,7 +39,7 @@ def motion(n: int = 8000, dt: float = 0.001) -> Motion:
         position += amplitude * (np.sin(w * t + phase) - np.sin(phase))
         velocity += amplitude * w * np.cos(w * t + phase)
         acceleration -= amplitude * w**2 * np.sin(w * t + phase)
-    current = TRUTH["mass"] * acceleration + TRUTH["viscous"] * velocity + TRUTH["coulomb"] * np.sign(velocity)
+    current = TRUTH["mass"] * acceleration + TRUTH["viscous"] * velocity + coulomb * np.sign(velocity)
     noise = rng.normal(0, 0.02, n)
     reference = np.interp(t + 0.004, t, position)
     return Motion(t, np.round(position / 1e-7) * 1e-7, velocity, np.round((current + noise) / 1e-4) * 1e-4, reference)
@@ -124,6 +123,8 @@ def matlab_table(path: Path, m: Motion, *, is_timed: bool, version: str) -> None
         frame = pd.DataFrame({"t_s": m.t} | columns)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it says which unit of time it chose
+        from matio import save_to_mat
+
         save_to_mat(str(path), {"run": frame}, version=version)
 
 

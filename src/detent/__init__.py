@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from detent.errors import DetentError, InputError
     from detent.identify.analysed import Analysed, analyse
     from detent.identify.identified import Identified, identify_axis
+    from detent.identify.records import Compared, compare_records
     from detent.operate.client import LiveAxis
     from detent.operate.start import connect, live
     from detent.record.trace_files import load_trace
@@ -30,6 +31,7 @@ _PLACES = {
     "detent.errors": ("DetentError", "InputError"),
     "detent.identify.analysed": ("Analysed", "analyse"),
     "detent.identify.identified": ("Identified", "identify_axis"),
+    "detent.identify.records": ("Compared", "compare_records"),
     "detent.operate.start": ("connect", "live"),
     "detent.operate.client": ("LiveAxis",),
     "detent.record.trace_files": ("load_trace",),
@@ -41,10 +43,10 @@ _PLACES = {
 """Where the words of the API stand; each loads at its first use: `import detent` and `detent --help` stay quick."""
 
 __all__ = [
-    "Analysed", "Axis", "DetentError", "Hunted", "Identified", "InputError", "LiveAxis", "Run", "Timing", "Tolerated",
-    "Tuned",
+    "Analysed", "Axis", "Compared", "DetentError", "Hunted", "Identified", "InputError", "LiveAxis", "Run", "Timing",
+    "Tolerated", "Tuned",
     "__version__",
-    "analyse", "connect", "example", "examples", "identify_axis", "live", "load", "load_trace",
+    "analyse", "compare_records", "connect", "example", "examples", "identify_axis", "live", "load", "load_trace",
 ]  # fmt: skip
 
 

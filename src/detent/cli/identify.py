@@ -36,6 +36,10 @@ WRITE = (
     "identified is put: comments, units and layout stay."
 )
 REPORT = "Write the report, one self-contained HTML file."
+COMPARE = (
+    "Identify each recording alone and say which constants changed between them, and where one more recording is "
+    "expected."
+)
 JOB = "Write a list of moves (TOML) that would supply what the logs lack."
 Effort = Annotated[str | None, option("--effort", "ROLE", EFFORT)]
 
@@ -54,20 +58,29 @@ def identify(
     job: Annotated[Path | None, option("--job", "FILE", JOB)] = None,
     report: Annotated[Path | None, option("--report", "FILE", REPORT)] = None,
     *,
+    compare: Annotated[bool, typer.Option("--compare", help=COMPARE, show_default=False)] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Identify mass, friction and delay from recordings, with confidence limits; refuse what the data do not determine.
 
     Exit status: 0 all constants are trusted, 1 some or all are refused (the output says what to record), 2 wrong
-    input.
+    input. With --compare: 0 nothing changed, 1 something did, or nothing can be compared.
     """
     from detent.identify.identified import identify_axis
 
-    axis = _check_outputs(axis, write, job, report, force=force)
     if method not in METHODS:
         raise DetentError(f"--method: got {method!r}; expected: {' or '.join(METHODS)}; choose one of them")
     chosen = cast("Method", METHODS[method])
+    if compare:
+        named = [
+            name for name, path in {"--axis": axis, "--write": write, "--job": job, "--report": report}.items() if path
+        ]
+        if named:
+            raise DetentError(f"--compare: got {', '.join(named)} beside it; expected: recordings alone; leave it out")
+        _compare(logs, mapping, columns or [], effort, chosen, as_json=as_json)
+        return
+    axis = _check_outputs(axis, write, job, report, force=force)
     # Options that read the logs in the same way once more.
     options = ["--map", str(mapping)] if mapping is not None else []
     options += [part for column in columns or [] for part in ("--column", column)]
@@ -97,6 +110,30 @@ def identify(
             say("--job FILE writes moves that show what is missing")
     if done.verdict != "trusted" or errors:
         raise typer.Exit(max([NOT_DONE, *(error.exit_status for error in errors)]))
+
+
+def _compare(
+    logs: list[Path], mapping: Path | None, columns: list[str], effort: str | None, method: "Method", *, as_json: bool
+) -> None:
+    """Compare recordings, each identified alone."""
+    from detent.identify.records import compare_records
+
+    with progress_bar(quiet=as_json) as progress:
+        done = compare_records(logs, mapping=mapping, columns=columns, effort=effort, method=method, progress=progress)
+    if as_json:
+        print_json(done.to_dict())
+    else:
+        say(done.sentence, "bold yellow" if done.changed or not done.constants else "bold green")
+        for one in done.each:
+            if one.verdict != "trusted":
+                say(f"  {one.sentence}", "yellow")
+        tell()
+        if done.constants:
+            print_table(*done.table)
+        if done.alone:
+            say(f"trusted in one recording only: {', '.join(done.alone)}", "dim")
+    if done.changed or not done.constants:
+        raise typer.Exit(NOT_DONE)
 
 
 def _check_outputs(axis: Path | None, *targets: Path | None, force: bool) -> Path | None:

@@ -1,6 +1,7 @@
 """Recordings as files of arrays: HDF5, MATLAB, NumPy's NPZ, and Parquet, where pyarrow is installed."""
 
 import importlib
+import warnings
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -59,7 +60,9 @@ def _holds_objects(path: Path) -> bool:
 def _read_objects(path: Path, options: FileOptions) -> raw_table.RawTable:
     """Read tables and timetables of MATLAB; the times of the rows of a timetable are its time."""
     try:
-        matio: Any = importlib.import_module("matio")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # it sets an option of pandas that pandas will drop
+            matio: Any = importlib.import_module("matio")
     except ImportError:
         got = "a table or another object of MATLAB, which needs mat-io, which is not installed"
         remedy = (
