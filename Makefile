@@ -85,7 +85,7 @@ bench: venv-test ## how fast: nanoseconds per tick, seconds to compile, millisec
 	$(PYTEST) -m bench tests/bench --benchmark-columns=min,median,max,rounds $(PYTEST_ARGS)
 
 bench-smoke: venv-test ## run every benchmark once, without measuring
-	$(PYTEST) -m bench tests/bench --benchmark-disable $(PYTEST_ARGS)
+	$(PYTEST) -m bench tests/bench --benchmark-disable $(WHOLE_FILES) $(PYTEST_ARGS)
 
 # Compiled code is invisible to coverage: the tests of the steps run as plain Python, but for those that simulate too
 # long; all others run compiled, as in `make test`, and with them the panel's of the specification. Two processes at the
