@@ -332,7 +332,7 @@ class Axis(OnScreen):
     def hunt(  # noqa: PLR0913 - what may be asked
         self,
         *,
-        starts: int = 24,
+        starts: int | None = None,
         seed: int = 1,
         on_counts: bool = False,
         dead_band: bool = False,
@@ -343,8 +343,9 @@ class Axis(OnScreen):
 
         Parameters
         ----------
-        starts : int
-            How many, at least 12; a third each are small, wide and hard. The first are the same however many there are.
+        starts : int, optional
+            How many; the first are the same however many there are. 24 unless told otherwise, at least 12, a third
+            each small, wide and hard; of a method that draws none eight, which are moves or stops of its own host.
         seed : int
             What they are drawn from.
         on_counts : bool
@@ -364,7 +365,9 @@ class Axis(OnScreen):
         Raises
         ------
         DetentError
-            The method is not watched at standstill, or there are too few starts.
+            The method closes no loop at rest, or there are too few starts.
+        AxisError
+            The guard of the axis switches it off where it should stand.
         """
         from detent.tune.hunted import hunt
 

@@ -861,3 +861,48 @@ def test_39_the_filtered_servo_by_processes(tmp_path):
     chunks = chunks_of(rubs, 300)
     assert len(chunks) > 2
     assert case_of(run_chunk(rubs, 171, 1), 171)[1]["error"] == results["error"][171]
+
+
+def rubbing(force: float, static: float = 1.0) -> list[str]:
+    """Friction of both directions [N]; static over Coulomb friction."""
+    return [f"mechanics.friction.{side}.{kind}={value} N" for side in ("right", "left")
+            for kind, value in (("coulomb", force), ("static", static * force))]  # fmt: skip
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("counts", "swing"), [(0.0, 1.0), (0.1, 0.0), (0.5, 0.0), (0.9, 0.0), (1.1, 0.0)])
+def test_23_a_filtered_servo_rests_by_friction_and_swings_over_a_count_without(counts, swing):
+    friction = rubbing(counts * 35.2e-3 * 0.05 * math.tau / 5e-3)  # a count of drive, as a force on the slide
+    found = detent.load(detent.example("filtered_servo.toml"), friction).hunt().standing
+    pulse = found.ensemble.grain
+    assert {one.outcome for one in found.found} == {"hunts" if swing else "rests"}
+    assert [one.swing.motor / pulse for one in found.found] == pytest.approx([swing] * 8, rel=0.05)
+    # At rest it counts no deviation: its true place is within the pulse. More than a count of friction can hold one
+    # count of deviation as well; a stop of eight ends so, on the edge.
+    away = [one for one in found.found if abs(one.error) >= pulse]
+    assert len(away) <= (1 if counts > 1.0 else 0)
+    assert all(abs(one.error) < 1.1 * pulse for one in away)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("overrides", "swing", "period"),
+    [
+        ((), 0.78, 3.8e-3),
+        (("method.position_gains=[2,16,1]",), 0.57, None),
+        (("method.position_gains=[3,16,1]",), 0.76, None),
+        (("method.position_gains=[7,16,1]",), 1.46, None),
+        (rubbing(2.0, 1.2), 0.47, None),
+    ],
+)
+def test_23_a_phase_servo_swings_while_it_settles_and_rests_at_stop(overrides, swing, period):
+    found = detent.load(detent.example("phase_servo.toml"), list(overrides)).hunt()
+    assert found.standing.shares["rests"] == 1.0
+    assert found.earlier is not None
+    settling = found.earlier[1]
+    (kind,) = [*settling.kinds_of("hunts"), *settling.kinds_of("flickers")][:1]
+    step = settling.ensemble.grain
+    seen = [one.swing.motor / step for one in settling.found]
+    assert np.median(seen) == pytest.approx(swing, rel=0.3)
+    if period is not None:
+        assert kind.period == pytest.approx(period, rel=0.3)

@@ -17,7 +17,7 @@ GOAL = (
 HOLD = "Leave this key as it is, as in method.velocity_gain; repeat for more."
 REPORT = "Write the report, one self-contained HTML file."
 WRITE = "Write the axis file with the gains; its text otherwise stays. It may be the file itself."
-STARTS = "How many starts; a third each are small, wide and hard."
+STARTS = "How many starts: 24, at least 12, a third each small, wide and hard; of a method without these 8 moves."
 SEED = "What the starts are drawn from."
 ON_COUNTS = "Targets lie on counts of the encoder."
 BAND = "Find the least dead band of the integral that stops it."
@@ -86,7 +86,7 @@ def tune(
 def hunt(
     file: File,
     overrides: Set = None,
-    starts: Annotated[int, option("--starts", "N", STARTS)] = 24,
+    starts: Annotated[int | None, option("--starts", "N", STARTS)] = None,
     seed: Annotated[int, option("--seed", "N", SEED, min=0)] = 1,
     on_counts: Annotated[bool, option("--on-counts", "", ON_COUNTS)] = False,
     dead_band: Annotated[bool, option("--dead-band", "", BAND)] = False,
@@ -127,7 +127,7 @@ def hunt(
         for one in found.told:
             say(f"  {one}")
         if found.rows:
-            print_table("", ("", "motor", "load", "every", "starts"), found.rows)
+            print_table("", found.heads, found.rows)
         if found.assumed:
             print_table(*found.table)
         for path in written:

@@ -261,7 +261,8 @@ class Method(Protocol[SpecT]):
     tunes: ClassVar[str] = ""
     """Place of what chooses its gains: ``tuning(spec)`` gives a `tuning.Tuning`; none where it has no gains."""
     stands: ClassVar[str] = ""
-    """Place of what watches it at standstill: ``ensemble(spec)`` gives a `tuning.Ensemble`; none where nothing does."""
+    """Place of what watches it at standstill: ``ensemble(spec)`` gives a `tuning.Ensemble`; none where no loop does."""
+    rests: ClassVar[str] = ""  # what holds it at rest where no loop does, as the end of a sentence
     keeps: ClassVar[str] = ""
     """Place of what its controller keeps where the machine is another than that of its file: ``kept(spec)`` gives
     values by dotted key."""
@@ -431,8 +432,9 @@ class Method(Protocol[SpecT]):
         """What watches it at standstill; refused where no loop holds it there."""
         if not self.stands:
             raise DetentError(
-                f"{spec.axis.name}: got an axis of the method {self.name}, which is not watched at standstill; "
-                "expected: a method that brings its starts, such as cascade; try: see how moves end with `detent run`"
+                f"{spec.axis.name}: got an axis of the method {self.name}, which closes no loop at rest"
+                f"{self.rests and f': {self.rests}'}; expected: a method that holds its place by a loop, which may "
+                "hunt; try: see how moves end with `detent run`"
             )
         return self.brought(self.stands)(spec)
 

@@ -142,19 +142,51 @@ class Course(Protocol):
 
 
 class Ensemble(Protocol):
-    """An axis at standstill, from many starts: what `hunt` asks of a method."""
+    """An axis at standstill, from many starts: what `hunt` asks of a method.
+
+    What a class derived from it leaves out has the default that stands here.
+    """
 
     unit: str
     """Of positions."""
     grain: float
     """Travel per count of the position loop's encoder, or what stands for it [m]; half of it is called flicker."""
-    rule: Rule
-    stated: bool
-    """True where the file states static friction and Stribeck velocity, on which the answer depends."""
-    band: str
+    usual: int = 24
+    """Starts unless told otherwise."""
+    fewest: int = 12
+    """Starts at least."""
+    draws: str = "a third each small, wide and hard"
+    """What the starts are, in words."""
+    between: bool = True
+    """Whether targets may lie between counts of the encoder."""
+    single: bool = False
+    """True where one mass moves: the load is the motor."""
+    command_unit: str = "V"
+    """Of the command; "count" for the word of a drive."""
+    band: str = ""
     """Key of the dead band that stops hunting; empty where there is none."""
-    integral: str
-    """Key of the integral gain."""
+    remarks: Sequence[str] = ()
+    """What else is to be said of these starts, in sentences without their full stop."""
+
+    @property
+    def integral(self) -> str:
+        """Key of the integral gain; empty where there is none."""
+        return ""
+
+    @property
+    def rule(self) -> Rule | None:
+        """The rule of thumb; None where there is none for this law."""
+        return None
+
+    @property
+    def stated(self) -> bool:
+        """True where the file states static friction and Stribeck velocity, or the answer depends on neither."""
+        return True
+
+    @property
+    def earlier(self) -> "tuple[str, Any] | None":
+        """A phase before that of rest: its name, and the specification of an axis that never leaves it."""
+        return None
 
     def courses(self, starts: int, seed: int, *, on_counts: bool) -> "Sequence[Course]":
         """The axis at its starts, each the same however many there are."""
@@ -170,4 +202,5 @@ class Ensemble(Protocol):
 
     def slips(self, errors: "NDArray[np.float64]") -> "NDArray[np.float64] | None":
         """Error [m] at the standstill behind a slip that begins at each of these; None where it is no map of one."""
-        ...
+        del errors
+        return None

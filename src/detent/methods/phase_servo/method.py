@@ -44,6 +44,7 @@ class PhaseServoMethod(MoveMethod[PhaseServoSpec]):
     every = 256
     seed = "detector.seed"
     signals, timing = SIGNALS, TIMING
+    stands = "standstill:PhaseEnsemble"
     lives = "live:live"
     compares = "comparison:compare_noise", "comparison:compare_hold"
     commands, shows = "host:PhaseHost", "page:PhaseView"

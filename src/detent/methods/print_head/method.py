@@ -32,6 +32,7 @@ class PrintHeadMethod(Method[PrintHeadSpec]):
     )  # fmt: skip
     takes, reads, runs = "print_job:PrintJob", "print_job:load_job", "run:print_job"
     lives = "live:live"
+    rests = "its drive is off there, and friction holds the carriage"
     compares = ("comparison:compare_drives",)
     sums_up, reports = "page:summary_rows", "page:print_page"
     says = "Printed {job} on {axis}.", "Not printed: {failure}"
