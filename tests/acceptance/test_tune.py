@@ -906,3 +906,33 @@ def test_23_a_phase_servo_swings_while_it_settles_and_rests_at_stop(overrides, s
     assert np.median(seen) == pytest.approx(swing, rel=0.3)
     if period is not None:
         assert kind.period == pytest.approx(period, rel=0.3)
+
+
+@pytest.mark.compiled
+def test_15_a_phase_servo_with_too_little_damping_has_a_hard_cycle_and_the_packaged_gains_pass():
+    spec = detent.load(detent.example("phase_servo.toml")).spec
+    search = METHODS["phase_servo"].search(spec)
+    job = METHODS["phase_servo"].trial_job(spec)
+    assert len(job.moves) == 3
+    loose = search.tried(spec.varied({"method.position_gains": [4, 1, 1]}), job)
+    told = re.fullmatch(r"hard cycle of (\S+) steps at (\S+) Hz while settling", loose.refused)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(54.0, rel=0.02)
+    assert float(told[2]) == pytest.approx(50.0, rel=0.02)
+    packaged = search.tried(spec, job)
+    assert packaged.refused == ""
+    # The ranking: settling in whole speed samples, then the swing, in steps.
+    assert packaged.rank[0] * spec.sample_period == pytest.approx(1.5e-3, rel=0.2)
+    assert packaged.rank[1] == pytest.approx(0.78, rel=0.3)
+
+
+@pytest.mark.long
+@pytest.mark.compiled
+def test_15_all_gains_that_fit_the_drive_word_are_tried():
+    found = detent.load(detent.example("phase_servo.toml")).tune()
+    assert found.done
+    refused = {tuple(one.values["method.position_gains"]): one.trial.refused for one in found.candidates}
+    assert len(refused) == 7 * 64
+    assert all(refused[k1, 1, 1].startswith("hard cycle") for k1 in range(1, 8))
+    assert refused[4, 16, 1] == ""
+    assert found.after.rank <= found.before.rank

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from detent.methods.batch import Batch
     from detent.methods.linear import LinearModel
     from detent.methods.position import PositionSensor
-    from detent.methods.tuning import Ensemble, Tuning
+    from detent.methods.tuning import Ensemble, Search, Tuning
     from detent.page.frame import Comparison, Page
     from detent.plant.injection import Place
     from detent.record.capture import Clocking
@@ -260,6 +260,9 @@ class Method(Protocol[SpecT]):
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
     tunes: ClassVar[str] = ""
     """Place of what chooses its gains: ``tuning(spec)`` gives a `tuning.Tuning`; none where it has no gains."""
+    searches: ClassVar[str] = ""
+    """Place of what chooses values by simulation alone, where no linear model does: ``search(spec)`` gives a
+    `tuning.Search`."""
     stands: ClassVar[str] = ""
     """Place of what watches it at standstill: ``ensemble(spec)`` gives a `tuning.Ensemble`; none where no loop does."""
     rests: ClassVar[str] = ""  # what holds it at rest where no loop does, as the end of a sentence
@@ -427,6 +430,10 @@ class Method(Protocol[SpecT]):
                 f"expected: a method with one; try: compare settings of this one with `detent run --set KEY=VALUE`"
             )
         return self.brought(self.tunes)(spec)
+
+    def search(self, spec: SpecT) -> "Search":
+        """What chooses its values by simulation; of a method that has `searches`."""
+        return self.brought(self.searches)(spec)
 
     def standstill(self, spec: SpecT) -> "Ensemble":
         """What watches it at standstill; refused where no loop holds it there."""

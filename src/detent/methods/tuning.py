@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
@@ -72,6 +72,43 @@ class Tuning(Protocol):
         """Shares of feedforward, by the keys that are stated and the relative uncertainty of those that have one."""
         del stated, known
         return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """What a simulation says of some values."""
+
+    refused: str  # why they will not do, in a few words; empty where they will
+    rank: tuple[float, ...] = ()  # of two that will do the smaller is the better
+    figures: Mapping[str, str] = field(default_factory=dict[str, str])  # by name, as people read them
+
+
+class Search(Protocol):
+    """The choice of values that no linear model gives: each candidate is simulated.
+
+    What a class derived from it leaves out has the default that stands here.
+    """
+
+    keys: tuple[str, ...]
+    """Keys of the file that it chooses."""
+    decides: str
+    """What the best of those that will do has least of, in words."""
+    measure: str
+    """The first of what ranks them, as the label of an axis."""
+    sides: tuple[str, str]
+    """The two things in which candidates differ."""
+
+    def candidates(self, held: Sequence[str]) -> Sequence[Mapping[str, Any]]:
+        """Values that are tried; keys that are held have that of the file."""
+        ...
+
+    def place(self, values: Mapping[str, Any]) -> tuple[float, float]:
+        """Of the two things in which candidates differ."""
+        ...
+
+    def tried(self, spec: Any, job: Any) -> Trial:
+        """What an axis with such values does, with the moves of a job or those of the method."""
+        ...
 
 
 def digits(value: float, how: Callable[[float], float] = round) -> float:
