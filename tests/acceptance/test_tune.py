@@ -936,3 +936,23 @@ def test_15_all_gains_that_fit_the_drive_word_are_tried():
     assert all(refused[k1, 1, 1].startswith("hard cycle") for k1 in range(1, 8))
     assert refused[4, 16, 1] == ""
     assert found.after.rank <= found.before.rank
+
+
+@pytest.mark.wide
+def test_39_filtered_servos_fail_where_their_loop_is_unstable_and_friction_does_not_hold_it(tmp_path):
+    loop = SampledLoop(gain=4000.0, sample_period=5e-3, scale=4, coefficient=0.25, position_gain=1.0, tau_m=math.inf)
+    assert loop.stability_limit() == pytest.approx(10_216, rel=1e-3)
+    unstable = (13_000 - loop.stability_limit()) / 9000
+    assert unstable == pytest.approx(0.31, abs=0.005)
+    text, stop = (EXAMPLES / "filtered_servo.toml").read_text(encoding="utf-8"), one_move("stop", 0.02, 0.3)
+    sides = "".join(f'"mechanics.friction.{side}.coulomb" = ["0 N", "3.39 N"]\n' for side in ("right", "left"))
+    drive = '"drive.current_per_count" = ["35.2 mA", "114.4 mA"]\n'
+    made = run_chunk(asked(tmp_path, f"[tolerance]\n{sides}{drive}", stop, text), 0, 2000)
+    fails = made.results["done"] == 0.0
+    assert fails.mean() == pytest.approx(0.31, abs=0.04)
+    # Friction of 0 to 1.5 counts, as in the first half: it holds a few of the loops that are unstable by a little, and
+    # whole counts keep hardly any swinging that are not.
+    beyond = made.values["drive.current_per_count"] * 4000 / 35.2e-3 > loop.stability_limit()
+    assert beyond.mean() == pytest.approx(unstable, abs=0.03)
+    assert fails[beyond].mean() > 0.8
+    assert fails[~beyond].mean() < 0.05
