@@ -884,6 +884,7 @@ def test_23_a_filtered_servo_rests_by_friction_and_swings_over_a_count_without(c
     assert all(abs(one.error) < 1.1 * pulse for one in away)
 
 
+@pytest.mark.wide
 @pytest.mark.compiled
 @pytest.mark.parametrize(
     ("overrides", "swing", "period"),

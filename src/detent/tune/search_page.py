@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from detent.tune.searched import Candidate, Searched
 
 TOP = 10  # candidates in the table
-FEW = 3  # places of a curve below which it shows nothing
+FEW = 2  # places below which curves show nothing
 
 
 def searched_page(found: "Searched") -> Page:
@@ -74,10 +74,10 @@ def _map(found: "Searched") -> Figure:
         return Figure(title=title)
     place = found.search.place(found.values)
     x, y = _ranks(found, chosen=True, place=place[0])
-    if np.isfinite(y).sum() < FEW:
-        return Figure(title=title)
     curves = [Curve(label=f"{first} {place[0]:g}, chosen", colour="speed", y=np.array(y), rings=7, digits=4)]
     others, least = _ranks(found, chosen=False, place=place[0])
+    if np.isfinite([*y, *least]).sum() < FEW:
+        return Figure(title=title)
     if others == x and np.isfinite(least).any():
         curves.insert(0, Curve(label=f"best of every other {first}", colour="muted", y=np.array(least), digits=4))
     panel = Panel(name="search", label=found.search.measure, curves=curves, zero=True)

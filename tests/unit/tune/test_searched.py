@@ -24,7 +24,7 @@ def judged(self, spec, job):
     if k2 == 1:
         return Trial("hard cycle of 54 steps while settling", figures={"swing": "54 steps"})
     if k1 > 3 or (k1 > 1 and spec.mechanics.carriage_mass > 0.61):
-        return Trial("a move does not arrive")
+        return Trial("a move does not arrive", figures={"swing": "2 steps"})
     return Trial("", (10.0 - k1, 0.5), {"settling": f"{10 - k1} ms", "swing": "1 step"})
 
 
@@ -61,6 +61,8 @@ def test_the_best_candidate_is_told_written_and_drawn(file):
     page = report.read_text(encoding="utf-8")
     assert "hard cycle" in page
     assert "3 of them will do" in page
+    assert '"search"' in page
+    assert "2 steps before" in page
     screen = run(str(file)).output
     assert "hard cycle: 7, a move does not arrive: 4" in screen
 
