@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from detent.record.trace_files import load_trace
     from detent.runs import Run, Timing
     from detent.tune.hunted import Hunted
+    from detent.tune.searched import Searched
     from detent.tune.tolerated import Tolerated
     from detent.tune.tuned import Tuned
 
@@ -38,13 +39,14 @@ _PLACES = {
     "detent.runs": ("Run", "Timing"),
     "detent.tune.hunted": ("Hunted",),
     "detent.tune.tolerated": ("Tolerated",),
+    "detent.tune.searched": ("Searched",),
     "detent.tune.tuned": ("Tuned",),
 }
 """Where the words of the API stand; each loads at its first use: `import detent` and `detent --help` stay quick."""
 
 __all__ = [
-    "Analysed", "Axis", "Compared", "DetentError", "Hunted", "Identified", "InputError", "LiveAxis", "Run", "Timing",
-    "Tolerated", "Tuned",
+    "Analysed", "Axis", "Compared", "DetentError", "Hunted", "Identified", "InputError", "LiveAxis", "Run", "Searched",
+    "Timing", "Tolerated", "Tuned",
     "__version__",
     "analyse", "compare_records", "connect", "example", "examples", "identify_axis", "live", "load", "load_trace",
 ]  # fmt: skip

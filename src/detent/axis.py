@@ -30,6 +30,7 @@ from detent.runs import Run, Timing
 if TYPE_CHECKING:
     from detent.methods.linear import LinearModel
     from detent.tune.hunted import Hunted
+    from detent.tune.searched import Searched
     from detent.tune.tolerated import Tolerated
     from detent.tune.tuned import Tuned
 
@@ -287,22 +288,22 @@ class Axis(OnScreen):
     def tune(  # noqa: PLR0913 - what may be asked
         self,
         *,
-        ms: float = 1.7,
-        overshoot: float = 1.1,
+        ms: float | None = None,
+        overshoot: float | None = None,
         goal: str = "",
         hold: Sequence[str] = (),
         job: str | Path | Job | None = None,
         progress: Progress | None = None,
-    ) -> "Tuned":
+    ) -> "Tuned | Searched":
         """Choose gains with margins, for all that ``[tolerance]`` allows, and try them on the simulation.
 
         Parameters
         ----------
-        ms : float
-            Largest sensitivity, the peak of ``|1/(1 + L)|`` where a loop is cut, 1.2 to 2.5. It leaves a gain margin of
-            Ms/(Ms - 1) and a phase margin of 2 asin(1/(2 Ms)).
-        overshoot : float
-            Largest peak of the reference to the position without feedforward, 1 to 2.
+        ms : float, optional
+            Largest sensitivity, the peak of ``|1/(1 + L)|`` where a loop is cut, 1.2 to 2.5, 1.7 unless told
+            otherwise. It leaves a gain margin of Ms/(Ms - 1) and a phase margin of 2 asin(1/(2 Ms)).
+        overshoot : float, optional
+            Largest peak of the reference to the position without feedforward, 1 to 2, 1.1 unless told otherwise.
         goal : str
             "stiff": as much integral stiffness as the bounds allow; "quiet": as little noise as the stiffness of the
             file's gains takes; "quick": of gains between both, those with which the job settles first. Default: the
@@ -316,23 +317,30 @@ class Axis(OnScreen):
 
         Returns
         -------
-        Tuned
-            Also where no gains were found: see `Tuned.refusals`.
+        Tuned or Searched
+            Also where nothing was found: see `refusals`. Of a method whose values no linear model gives, candidates
+            are simulated (`Searched`): it takes neither `ms`, `overshoot` nor `goal`.
 
         Raises
         ------
         DetentError
-            The method has no gains that a linear model chooses, or a parameter is out of its range.
+            The method has nothing to choose, or a parameter is out of its range.
         """
+        from detent.tune.searched import no_bounds, search
         from detent.tune.tuned import tune
 
         tried = None if job is None else self._job(job)
-        return tune(self.file, sensitivity=ms, overshoot=overshoot, goal=goal, hold=hold, job=tried, progress=progress)
+        if self.method.searches:
+            no_bounds(self.file, {"ms": ms, "overshoot": overshoot, "goal": goal or None})
+            return search(self.file, hold=hold, job=tried, progress=progress)
+        bounds = {"sensitivity": ms, "overshoot": overshoot}
+        given = {name: value for name, value in bounds.items() if value is not None}
+        return tune(self.file, **given, goal=goal, hold=hold, job=tried, progress=progress)
 
     def hunt(  # noqa: PLR0913 - what may be asked
         self,
         *,
-        starts: int = 24,
+        starts: int | None = None,
         seed: int = 1,
         on_counts: bool = False,
         dead_band: bool = False,
@@ -343,8 +351,9 @@ class Axis(OnScreen):
 
         Parameters
         ----------
-        starts : int
-            How many, at least 12; a third each are small, wide and hard. The first are the same however many there are.
+        starts : int, optional
+            How many; the first are the same however many there are. 24 unless told otherwise, at least 12, a third
+            each small, wide and hard; of a method that draws none eight, which are moves or stops of its own host.
         seed : int
             What they are drawn from.
         on_counts : bool
@@ -364,7 +373,9 @@ class Axis(OnScreen):
         Raises
         ------
         DetentError
-            The method is not watched at standstill, or there are too few starts.
+            The method closes no loop at rest, or there are too few starts.
+        AxisError
+            The guard of the axis switches it off where it should stand.
         """
         from detent.tune.hunted import hunt
 

@@ -861,3 +861,99 @@ def test_39_the_filtered_servo_by_processes(tmp_path):
     chunks = chunks_of(rubs, 300)
     assert len(chunks) > 2
     assert case_of(run_chunk(rubs, 171, 1), 171)[1]["error"] == results["error"][171]
+
+
+def rubbing(force: float, static: float = 1.0) -> list[str]:
+    """Friction of both directions [N]; static over Coulomb friction."""
+    return [f"mechanics.friction.{side}.{kind}={value} N" for side in ("right", "left")
+            for kind, value in (("coulomb", force), ("static", static * force))]  # fmt: skip
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("counts", "swing"), [(0.0, 1.0), (0.1, 0.0), (0.5, 0.0), (0.9, 0.0), (1.1, 0.0)])
+def test_23_a_filtered_servo_rests_by_friction_and_swings_over_a_count_without(counts, swing):
+    friction = rubbing(counts * 35.2e-3 * 0.05 * math.tau / 5e-3)  # a count of drive, as a force on the slide
+    found = detent.load(detent.example("filtered_servo.toml"), friction).hunt().standing
+    pulse = found.ensemble.grain
+    assert {one.outcome for one in found.found} == {"hunts" if swing else "rests"}
+    assert [one.swing.motor / pulse for one in found.found] == pytest.approx([swing] * 8, rel=0.05)
+    # At rest it counts no deviation: its true place is within the pulse. More than a count of friction can hold one
+    # count of deviation as well; a stop of eight ends so, on the edge.
+    away = [one for one in found.found if abs(one.error) >= pulse]
+    assert len(away) <= (1 if counts > 1.0 else 0)
+    assert all(abs(one.error) < 1.1 * pulse for one in away)
+
+
+@pytest.mark.wide
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("overrides", "swing", "period"),
+    [
+        ((), 0.78, 3.8e-3),
+        (("method.position_gains=[2,16,1]",), 0.57, None),
+        (("method.position_gains=[3,16,1]",), 0.76, None),
+        (("method.position_gains=[7,16,1]",), 1.46, None),
+        (rubbing(2.0, 1.2), 0.47, None),
+    ],
+)
+def test_23_a_phase_servo_swings_while_it_settles_and_rests_at_stop(overrides, swing, period):
+    found = detent.load(detent.example("phase_servo.toml"), list(overrides)).hunt()
+    assert found.standing.shares["rests"] == 1.0
+    assert found.earlier is not None
+    settling = found.earlier[1]
+    (kind,) = [*settling.kinds_of("hunts"), *settling.kinds_of("flickers")][:1]
+    step = settling.ensemble.grain
+    seen = [one.swing.motor / step for one in settling.found]
+    assert np.median(seen) == pytest.approx(swing, rel=0.3)
+    if period is not None:
+        assert kind.period == pytest.approx(period, rel=0.3)
+
+
+@pytest.mark.compiled
+def test_15_a_phase_servo_with_too_little_damping_has_a_hard_cycle_and_the_packaged_gains_pass():
+    spec = detent.load(detent.example("phase_servo.toml")).spec
+    search = METHODS["phase_servo"].search(spec)
+    job = METHODS["phase_servo"].trial_job(spec)
+    assert len(job.moves) == 3
+    loose = search.tried(spec.varied({"method.position_gains": [4, 1, 1]}), job)
+    told = re.fullmatch(r"hard cycle of (\S+) steps at (\S+) Hz while settling", loose.refused)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(54.0, rel=0.02)
+    assert float(told[2]) == pytest.approx(50.0, rel=0.02)
+    packaged = search.tried(spec, job)
+    assert packaged.refused == ""
+    # The ranking: settling in whole speed samples, then the swing, in steps.
+    assert packaged.rank[0] * spec.sample_period == pytest.approx(1.5e-3, rel=0.2)
+    assert packaged.rank[1] == pytest.approx(0.78, rel=0.3)
+
+
+@pytest.mark.long
+@pytest.mark.compiled
+def test_15_all_gains_that_fit_the_drive_word_are_tried():
+    found = detent.load(detent.example("phase_servo.toml")).tune()
+    assert found.done
+    refused = {tuple(one.values["method.position_gains"]): one.trial.refused for one in found.candidates}
+    assert len(refused) == 7 * 64
+    assert all(refused[k1, 1, 1].startswith("hard cycle") for k1 in range(1, 8))
+    assert refused[4, 16, 1] == ""
+    assert found.after.rank <= found.before.rank
+
+
+@pytest.mark.wide
+def test_39_filtered_servos_fail_where_their_loop_is_unstable_and_friction_does_not_hold_it(tmp_path):
+    loop = SampledLoop(gain=4000.0, sample_period=5e-3, scale=4, coefficient=0.25, position_gain=1.0, tau_m=math.inf)
+    assert loop.stability_limit() == pytest.approx(10_216, rel=1e-3)
+    unstable = (13_000 - loop.stability_limit()) / 9000
+    assert unstable == pytest.approx(0.31, abs=0.005)
+    text, stop = (EXAMPLES / "filtered_servo.toml").read_text(encoding="utf-8"), one_move("stop", 0.02, 0.3)
+    sides = "".join(f'"mechanics.friction.{side}.coulomb" = ["0 N", "3.39 N"]\n' for side in ("right", "left"))
+    drive = '"drive.current_per_count" = ["35.2 mA", "114.4 mA"]\n'
+    made = run_chunk(asked(tmp_path, f"[tolerance]\n{sides}{drive}", stop, text), 0, 2000)
+    fails = made.results["done"] == 0.0
+    assert fails.mean() == pytest.approx(0.31, abs=0.04)
+    # Friction of 0 to 1.5 counts, as in the first half: it holds a few of the loops that are unstable by a little, and
+    # whole counts keep hardly any swinging that are not.
+    beyond = made.values["drive.current_per_count"] * 4000 / 35.2e-3 > loop.stability_limit()
+    assert beyond.mean() == pytest.approx(unstable, abs=0.03)
+    assert fails[beyond].mean() > 0.8
+    assert fails[~beyond].mean() < 0.05

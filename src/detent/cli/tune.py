@@ -8,8 +8,8 @@ import typer
 from detent.cli.app import NOT_DONE, File, Force, Job, Json, Set, app, option
 from detent.cli.terminal import print_json, print_table, progress_bar, say, split_names
 
-MS = "Largest sensitivity peak, 1.2 to 2.5; 1.7 leaves a gain margin of 2.4 and 34 degrees of phase."
-OVERSHOOT = "Largest peak of the reference to the position without feedforward, at least 1."
+MS = "Largest sensitivity peak, 1.2 to 2.5; the usual 1.7 leaves a gain margin of 2.4 and 34 degrees of phase."
+OVERSHOOT = "Largest peak of the reference to the position without feedforward, at least 1; usually 1.1."
 GOAL = (
     "stiff: the most integral stiffness; quiet: the least noise at the stiffness of the file; quick: of both, what "
     "settles first with the job."
@@ -17,7 +17,7 @@ GOAL = (
 HOLD = "Leave this key as it is, as in method.velocity_gain; repeat for more."
 REPORT = "Write the report, one self-contained HTML file."
 WRITE = "Write the axis file with the gains; its text otherwise stays. It may be the file itself."
-STARTS = "How many starts; a third each are small, wide and hard."
+STARTS = "How many starts: 24, at least 12, a third each small, wide and hard; of a method without these 8 moves."
 SEED = "What the starts are drawn from."
 ON_COUNTS = "Targets lie on counts of the encoder."
 BAND = "Find the least dead band of the integral that stops it."
@@ -29,8 +29,8 @@ WRITE_BAND = "Write the axis file with the dead band; its text otherwise stays. 
 def tune(
     file: File,
     overrides: Set = None,
-    sensitivity: Annotated[float, option("--ms", "NUMBER", MS)] = 1.7,
-    overshoot: Annotated[float, option("--overshoot", "NUMBER", OVERSHOOT)] = 1.1,
+    sensitivity: Annotated[float | None, option("--ms", "NUMBER", MS)] = None,
+    overshoot: Annotated[float | None, option("--overshoot", "NUMBER", OVERSHOOT)] = None,
     goal: Annotated[str, option("--for", "GOAL", GOAL)] = "",
     hold: Annotated[list[str] | None, option("--hold", "KEY", HOLD)] = None,
     job: Job = None,
@@ -41,6 +41,8 @@ def tune(
     as_json: Json = False,
 ) -> None:
     """Choose gains with margins, for all that [tolerance] allows, and try them on the simulated axis.
+
+    Where no linear model gives them, candidates are simulated: --ms, --overshoot and --for are not for these.
 
     Exit status: 0 chosen for all plants, 1 refused or chosen for the axis of the file only, 2 wrong input.
     """
@@ -86,7 +88,7 @@ def tune(
 def hunt(
     file: File,
     overrides: Set = None,
-    starts: Annotated[int, option("--starts", "N", STARTS)] = 24,
+    starts: Annotated[int | None, option("--starts", "N", STARTS)] = None,
     seed: Annotated[int, option("--seed", "N", SEED, min=0)] = 1,
     on_counts: Annotated[bool, option("--on-counts", "", ON_COUNTS)] = False,
     dead_band: Annotated[bool, option("--dead-band", "", BAND)] = False,
@@ -127,7 +129,7 @@ def hunt(
         for one in found.told:
             say(f"  {one}")
         if found.rows:
-            print_table("", ("", "motor", "load", "every", "starts"), found.rows)
+            print_table("", found.heads, found.rows)
         if found.assumed:
             print_table(*found.table)
         for path in written:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from detent.methods.batch import Batch
     from detent.methods.linear import LinearModel
     from detent.methods.position import PositionSensor
-    from detent.methods.tuning import Ensemble, Tuning
+    from detent.methods.tuning import Ensemble, Search, Tuning
     from detent.page.frame import Comparison, Page
     from detent.plant.injection import Place
     from detent.record.capture import Clocking
@@ -260,8 +260,12 @@ class Method(Protocol[SpecT]):
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
     tunes: ClassVar[str] = ""
     """Place of what chooses its gains: ``tuning(spec)`` gives a `tuning.Tuning`; none where it has no gains."""
+    searches: ClassVar[str] = ""
+    """Place of what chooses values by simulation alone, where no linear model does: ``search(spec)`` gives a
+    `tuning.Search`."""
     stands: ClassVar[str] = ""
-    """Place of what watches it at standstill: ``ensemble(spec)`` gives a `tuning.Ensemble`; none where nothing does."""
+    """Place of what watches it at standstill: ``ensemble(spec)`` gives a `tuning.Ensemble`; none where no loop does."""
+    rests: ClassVar[str] = ""  # what holds it at rest where no loop does, as the end of a sentence
     keeps: ClassVar[str] = ""
     """Place of what its controller keeps where the machine is another than that of its file: ``kept(spec)`` gives
     values by dotted key."""
@@ -427,12 +431,17 @@ class Method(Protocol[SpecT]):
             )
         return self.brought(self.tunes)(spec)
 
+    def search(self, spec: SpecT) -> "Search":
+        """What chooses its values by simulation; of a method that has `searches`."""
+        return self.brought(self.searches)(spec)
+
     def standstill(self, spec: SpecT) -> "Ensemble":
         """What watches it at standstill; refused where no loop holds it there."""
         if not self.stands:
             raise DetentError(
-                f"{spec.axis.name}: got an axis of the method {self.name}, which is not watched at standstill; "
-                "expected: a method that brings its starts, such as cascade; try: see how moves end with `detent run`"
+                f"{spec.axis.name}: got an axis of the method {self.name}, which closes no loop at rest"
+                f"{self.rests and f': {self.rests}'}; expected: a method that holds its place by a loop, which may "
+                "hunt; try: see how moves end with `detent run`"
             )
         return self.brought(self.stands)(spec)
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
@@ -74,6 +74,43 @@ class Tuning(Protocol):
         return ()
 
 
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """What a simulation says of some values."""
+
+    refused: str  # why they will not do, in a few words; empty where they will
+    rank: tuple[float, ...] = ()  # of two that will do the smaller is the better
+    figures: Mapping[str, str] = field(default_factory=dict[str, str])  # by name, as people read them
+
+
+class Search(Protocol):
+    """The choice of values that no linear model gives: each candidate is simulated.
+
+    What a class derived from it leaves out has the default that stands here.
+    """
+
+    keys: tuple[str, ...]
+    """Keys of the file that it chooses."""
+    decides: str
+    """What the best of those that will do has least of, in words."""
+    measure: str
+    """The first of what ranks them, as the label of an axis."""
+    sides: tuple[str, str]
+    """The two things in which candidates differ."""
+
+    def candidates(self, held: Sequence[str]) -> Sequence[Mapping[str, Any]]:
+        """Values that are tried; keys that are held have that of the file."""
+        ...
+
+    def place(self, values: Mapping[str, Any]) -> tuple[float, float]:
+        """Of the two things in which candidates differ."""
+        ...
+
+    def tried(self, spec: Any, job: Any) -> Trial:
+        """What an axis with such values does, with the moves of a job or those of the method."""
+        ...
+
+
 def digits(value: float, how: Callable[[float], float] = round) -> float:
     """A value above 0 with three digits, rounded so.
 
@@ -142,19 +179,51 @@ class Course(Protocol):
 
 
 class Ensemble(Protocol):
-    """An axis at standstill, from many starts: what `hunt` asks of a method."""
+    """An axis at standstill, from many starts: what `hunt` asks of a method.
+
+    What a class derived from it leaves out has the default that stands here.
+    """
 
     unit: str
     """Of positions."""
     grain: float
     """Travel per count of the position loop's encoder, or what stands for it [m]; half of it is called flicker."""
-    rule: Rule
-    stated: bool
-    """True where the file states static friction and Stribeck velocity, on which the answer depends."""
-    band: str
+    usual: int = 24
+    """Starts unless told otherwise."""
+    fewest: int = 12
+    """Starts at least."""
+    draws: str = "a third each small, wide and hard"
+    """What the starts are, in words."""
+    between: bool = True
+    """Whether targets may lie between counts of the encoder."""
+    single: bool = False
+    """True where one mass moves: the load is the motor."""
+    command_unit: str = "V"
+    """Of the command; "count" for the word of a drive."""
+    band: str = ""
     """Key of the dead band that stops hunting; empty where there is none."""
-    integral: str
-    """Key of the integral gain."""
+    remarks: Sequence[str] = ()
+    """What else is to be said of these starts, in sentences without their full stop."""
+
+    @property
+    def integral(self) -> str:
+        """Key of the integral gain; empty where there is none."""
+        return ""
+
+    @property
+    def rule(self) -> Rule | None:
+        """The rule of thumb; None where there is none for this law."""
+        return None
+
+    @property
+    def stated(self) -> bool:
+        """True where the file states static friction and Stribeck velocity, or the answer depends on neither."""
+        return True
+
+    @property
+    def earlier(self) -> "tuple[str, Any] | None":
+        """A phase before that of rest: its name, and the specification of an axis that never leaves it."""
+        return None
 
     def courses(self, starts: int, seed: int, *, on_counts: bool) -> "Sequence[Course]":
         """The axis at its starts, each the same however many there are."""
@@ -170,4 +239,5 @@ class Ensemble(Protocol):
 
     def slips(self, errors: "NDArray[np.float64]") -> "NDArray[np.float64] | None":
         """Error [m] at the standstill behind a slip that begins at each of these; None where it is no map of one."""
-        ...
+        del errors
+        return None

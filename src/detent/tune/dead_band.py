@@ -83,7 +83,8 @@ class Map:
 
 def band_map(spec: Any, found: Standstill, integral: float, progress: Progress = untold) -> Map:
     """Try every pair of dead band and integral from a few starts."""
-    keys, swing = found.ensemble, found.swing or found.ensemble.rule.swing or 4.0 * found.ensemble.grain
+    keys, rule = found.ensemble, found.ensemble.rule
+    swing = found.swing or (rule.swing if rule is not None else 0.0) or 4.0 * keys.grain
     widths, rows = [float(share * swing) for share in WIDTHS], list[list[Standstill]]()
     for share in INTEGRALS:
         row = list[Standstill]()

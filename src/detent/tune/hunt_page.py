@@ -32,11 +32,12 @@ def hunted_page(found: "Hunted") -> Page:
     """Put the page together."""
     level = "bad" if found.standing.hunts else "good" if found.standing.outcome == "rests" else "warn"
     name = found.file.spec.axis.name
-    heads = ("what", "motor", "load", "every", "starts")
+    heads = ("what", *found.heads[1:])
+    masses = "" if found.standing.ensemble.single else " of motor and load"
     kinds = Figure(
         title="Kinds", table=TextTable("", heads, found.rows).on_page if found.rows else None,
-        caption="Kinds that differ in amplitude or period by more than a factor of 3: swings of motor and load from "
-        "peak to peak, and from how many starts they come about.",
+        caption=f"Kinds that differ in amplitude or period by more than a factor of 3: swings{masses} from peak to "
+        "peak, and from how many starts they come about.",
     )  # fmt: skip
     return Page(
         title=f"{name}: at standstill",
@@ -53,7 +54,7 @@ def hunted_page(found: "Hunted") -> Page:
         ],
         settings={
             "axis file": found.file.file, "starts": str(len(found.standing.found)), "seed": str(found.standing.seed),
-            "targets": "on counts" if found.standing.on_counts else "anywhere",
+            "targets": "on counts" if found.standing.on_counts or not found.standing.ensemble.between else "anywhere",
         },
     )  # fmt: skip
 
@@ -105,23 +106,24 @@ def _worst(found: "Hunted") -> Figure:
     middle = 0.5 * (column["load_low"].min() + column["load_high"].max())
     ways = {name: 0.5 * (column[f"{name}_low"] + column[f"{name}_high"]) - middle for name in ("motor", "load")}
     scale = units.small(max(float(np.abs(way).max()) for way in ways.values()))
-    curves = [
-        Curve(label=name, colour=colour, y=ways[name] * scale.factor)
-        for name, colour in (("motor", "drive"), ("load", "speed"))
-    ]
+    masses = (("motor", "drive"), ("load", "speed"))[: 1 if found.standing.ensemble.single else 2]
+    curves = [Curve(label=name, colour=colour, y=ways[name] * scale.factor) for name, colour in masses]
+    unit = found.standing.ensemble.command_unit
     error = Curve(label="error", colour="current", y=column["error"] * scale.factor)
-    command = [Curve(label="command", colour="drive", y=column["command"], digits=4),
-               Curve(label="integral", colour="muted", y=column["integral"], digits=4)]  # fmt: skip
+    command = [Curve(label="command", colour="drive", y=column["command"], digits=4)]
+    if np.any(column["integral"] != 0.0):
+        command.append(Curve(label="integral", colour="muted", y=column["integral"], digits=4))
     panels = [
         Panel(
             name="worst-position", label=f"from the middle [{scale.name}]", curves=curves, title="Position", zero=True
         ),
         Panel(name="worst-error", label=f"error [{scale.name}]", curves=[error], title="Error", zero=True, height=160),
-        Panel(name="worst-command", label="command [V]", curves=command, title="Command and integral", height=160),
+        Panel(name="worst-command", label=f"command [{unit}]", curves=command, title="Command", height=160),
     ]
     unit = "ms" if t[-1] < 1.0 else "s"
     charts = time_charts(Timeline(name="worst", t=t, unit=unit, label="time"), panels)
-    caption = "The start that moves farthest, over its last five periods. While friction holds, the integral grows."
+    grows = " While friction holds, the integral grows." if len(command) > 1 else ""
+    caption = f"The start that moves farthest, over its last five periods.{grows}"
     return Figure(title="The worst start", caption=caption, charts=charts)
 
 

@@ -17,6 +17,7 @@ from detent.files.text import check_target, write_text
 from detent.methods.load import AxisFile
 from detent.methods.method import untold
 from detent.methods.registry import METHODS
+from detent.methods.tuning import Ensemble
 from detent.page.table import TextTable
 from detent.tune.choice import Progress, value_of
 from detent.tune.dead_band import Band, Map, band_map, least_band
@@ -25,10 +26,10 @@ from detent.units import format_quantity
 
 Numbers = NDArray[np.float64]
 
-LEAST_STARTS = 12
 RATIOS = 1.0, 1.15, 1.5, 2.0  # static over Coulomb friction that is tried where the file does not say
 SPEEDS = 0.0, 0.3e-3, 1e-3, 3e-3  # Stribeck velocities [m/s]
 TABLE_STARTS = 12
+EARLIER = 2.0  # of a phase before that of rest, which does not last, that is simulated at most [s]
 PLACES = 64  # errors of the return map
 
 
@@ -48,6 +49,8 @@ class Hunted(OnScreen):
         The least dead band that stops it; None where it was not sought.
     map : Map or None
         Verdicts over dead band and integral; None where it was not asked for.
+    earlier : tuple of str and Standstill, or None
+        A phase before that of rest, where the method has one: its name, and what the axis does if it never leaves it.
     assumed : sequence
         Where the file does not say how friction falls: ratio of static to Coulomb friction, Stribeck velocity [m/s],
         and what the axis does with them.
@@ -58,6 +61,7 @@ class Hunted(OnScreen):
     cured: bool | None
     band: Band | None
     map: Map | None
+    earlier: tuple[str, Standstill] | None
     assumed: Sequence[tuple[float, float, Standstill]]
 
     @property
@@ -111,16 +115,17 @@ class Hunted(OnScreen):
     def _told(self) -> Iterator[str]:
         for kind in self.standing.kinds:
             share = f"{len(kind.found)} of {len(self.standing.found)} starts"
-            why = "it hunts by itself" if kind.by_itself else "a knock starts it: small starts come to rest"
-            yield f"{self.motion(kind)} ({share}; {why})"
-        rule = self.standing.ensemble.rule
-        slow = [kind for kind in self.standing.kinds if kind.name == "stick-slip"]
-        if rule.swing > 0.0:
-            simulated = f"simulated {self.motion(slow[0]).partition(', ')[2]}" if slow else "the simulation does not"
-            every = format_quantity(rule.period, "s", 3)
-            yield f"rule of thumb: {self.length(rule.swing)} every {every}; {simulated}; what helps: {rule.why}"
-        else:
-            yield f"rule of thumb: no stick-slip, for {rule.why}"
+            why = "; it hunts by itself" if kind.by_itself else "; a knock starts it: small starts come to rest"
+            yield f"{self.motion(kind)} ({share}{'' if self.standing.ensemble.single else why})"
+        yield from self._rule_told()
+        if self.earlier is not None:
+            when, found = self.earlier
+            kinds = [*found.kinds, *found.kinds_of(FLICKERS)]
+            what = f"swings as long as it lasts: {self.motion(kinds[0])}" if kinds else found.outcome
+            yield f"{when}, it {what}"
+        if self.standing.ensemble.single and self.standing.rest_error > 0.0:
+            yield f"it rests up to {self.length(self.standing.rest_error)} off its target"
+        yield from self.standing.ensemble.remarks
         if self.cured is not None:
             yield "targets on counts of the encoder " + ("stop it" if self.cured else "do not stop it")
         if self.band is not None:
@@ -133,6 +138,19 @@ class Hunted(OnScreen):
                 "the file does not state static and stribeck everywhere, and the verdict depends on them: of "
                 f"{len(self.assumed)} that may be, it {seen}; record slow moves with reversals (`detent identify`)"
             )
+
+    def _rule_told(self) -> Iterator[str]:
+        """The rule of thumb beside what was simulated."""
+        rule = self.standing.ensemble.rule
+        if rule is None:
+            return
+        slow = [kind for kind in self.standing.kinds if kind.name == "stick-slip"]
+        if rule.swing > 0.0:
+            simulated = f"simulated {self.motion(slow[0]).partition(', ')[2]}" if slow else "the simulation does not"
+            every = format_quantity(rule.period, "s", 3)
+            yield f"rule of thumb: {self.length(rule.swing)} every {every}; {simulated}; what helps: {rule.why}"
+        else:
+            yield f"rule of thumb: no stick-slip, for {rule.why}"
 
     def _band_told(self, band: Band) -> str:
         """Width and cost of the dead band."""
@@ -147,12 +165,19 @@ class Hunted(OnScreen):
         )
 
     @property
-    def rows(self) -> list[tuple[str, str, str, str, str]]:
+    def heads(self) -> tuple[str, ...]:
+        """Heads of the rows."""
+        masses = ("swing",) if self.standing.ensemble.single else ("motor", "load")
+        return ("", *masses, "every", "starts")
+
+    @property
+    def rows(self) -> list[tuple[str, ...]]:
         """Kinds of hunting: what, how far the motor and the load go, how often, from how many starts."""
         kinds = [*self.standing.kinds, *self.standing.kinds_of(FLICKERS)]
+        masses = ("motor",) if self.standing.ensemble.single else ("motor", "load")
         return [
-            (one.name if one.worst.outcome == HUNTS else f"flicker, {one.name}", self.length(one.swing("motor")),
-             self.length(one.swing("load")),
+            (one.name if one.worst.outcome == HUNTS else f"flicker, {one.name}",
+             *(self.length(one.swing(mass)) for mass in masses),
              "-" if math.isnan(one.period) else format_quantity(one.period, "s", 3),
              f"{len(one.found)} ({', '.join(one.starts)})")
             for one in kinds
@@ -174,7 +199,8 @@ class Hunted(OnScreen):
     @cached_property
     def slips(self) -> tuple[Numbers, Numbers] | None:
         """Return map of the slips: errors at which one begins, and those behind it [m]; None where there is none."""
-        reach = 1.5 * max(self.standing.swing, self.standing.ensemble.rule.swing)
+        rule = self.standing.ensemble.rule
+        reach = 1.5 * max(self.standing.swing, rule.swing) if rule is not None else 0.0
         if reach == 0.0:
             return None
         errors = np.linspace(-reach, reach, PLACES)
@@ -234,8 +260,7 @@ class Hunted(OnScreen):
 
     def screen(self) -> Screen:
         """Verdict and kinds."""
-        heads = ("", "motor", "load", "every", "starts")
-        blocks = [Block("", heads, self.rows, 30)] if self.rows else []
+        blocks = [Block("", self.heads, self.rows, 30)] if self.rows else []
         return Screen("\n".join([self.sentence, self.file.file, *self.told]), blocks, ".report(FILE)")
 
     def to_dict(self) -> dict[str, Any]:
@@ -245,7 +270,8 @@ class Hunted(OnScreen):
             "sentence": self.sentence, "told": self.told, "outcome": self.standing.outcome,
             "seed": self.standing.seed, "on_counts": self.standing.on_counts, "shares": dict(self.standing.shares),
             "kinds": [_kind(one) for one in self.standing.kinds],
-            "rule": {"swing": rule.swing, "period": _finite(rule.period)}, "cured_on_counts": self.cured,
+            "rule": None if rule is None else {"swing": rule.swing, "period": _finite(rule.period)},
+            "cured_on_counts": self.cured, "earlier": None if self.earlier is None else _phase(*self.earlier),
             "dead_band": None if self.band is None else _band(self.band),
             "assumed": [{"ratio": ratio, "stribeck": speed, "outcome": one.outcome, "swing": one.swing}
                         for ratio, speed, one in self.assumed],
@@ -262,6 +288,11 @@ def _kind(one: Kind) -> dict[str, Any]:
         "name": one.name, "motor": one.swing("motor"), "load": one.swing("load"), "period": _finite(one.period),
         "largest": one.worst.swing.largest, "starts": len(one.found), "of": one.starts, "by_itself": one.by_itself,
     }  # fmt: skip
+
+
+def _phase(name: str, found: Standstill) -> dict[str, Any]:
+    kinds = [*found.kinds, *found.kinds_of(FLICKERS)]
+    return {"name": name, "outcome": found.outcome, "kinds": [_kind(one) for one in kinds]}
 
 
 def _band(band: Band) -> dict[str, Any]:
@@ -283,30 +314,46 @@ def _part(told: Progress, begin: float, end: float) -> Progress:
     return lambda share, text: told(begin + (end - begin) * share, text)
 
 
+def _check_asked(file: AxisFile, ensemble: Ensemble, starts: int, *, on_counts: bool, banded: bool) -> None:
+    """Refuse what this method has not."""
+    method = file.spec.axis.method
+    if starts < ensemble.fewest:
+        raise DetentError(
+            f"starts: got {starts}; expected: at least {ensemble.fewest}, {ensemble.draws}; try: {ensemble.usual}"
+        )
+    if on_counts and not ensemble.between:
+        raise DetentError(
+            f"{file.file}: got an axis of the method {method}, whose targets always lie on counts; expected: one whose "
+            "targets may lie between them; leave on_counts out"
+        )
+    if banded and not ensemble.band:
+        raise DetentError(
+            f"{file.file}: got an axis of the method {method}, which has no dead band of its integral that may be "
+            "sought; expected: a method with one, such as cascade; leave dead_band and map out"
+        )
+
+
 def hunt(  # noqa: PLR0913 - what may be asked
-    file: AxisFile, *, starts: int = 24, seed: int = 1, on_counts: bool = False, dead_band: bool = False,
+    file: AxisFile, *, starts: int | None = None, seed: int = 1, on_counts: bool = False, dead_band: bool = False,
     map_it: bool = False, progress: Progress | None = None,
 ) -> Hunted:  # fmt: skip
     """Watch an axis at standstill; parameters as of `Axis.hunt`."""
-    if starts < LEAST_STARTS:
-        raise DetentError(
-            f"starts: got {starts}; expected: at least {LEAST_STARTS}, a third each small, wide and hard; try: 24"
-        )
     told = progress or untold
     spec: Any = file.spec
-    if (dead_band or map_it) and not METHODS[spec.axis.method].standstill(spec).band:
-        raise DetentError(
-            f"{file.file}: got an axis of the method {spec.axis.method}, which has no dead band of its integral; "
-            "expected: a method with one, such as cascade; leave dead_band and map out"
-        )
+    ensemble = METHODS[spec.axis.method].standstill(spec)
+    starts = ensemble.usual if starts is None else starts
+    _check_asked(file, ensemble, starts, on_counts=on_counts, banded=dead_band or map_it)
     found = standstill(spec, starts, seed, on_counts=on_counts, progress=_part(told, 0.0, 0.3))
     ensemble = found.ensemble
-    cured = band = made = None
-    if found.hunts and not on_counts:
+    cured = band = made = earlier = None
+    if found.hunts and not on_counts and ensemble.between:
         told(0.3, "targets on counts")
         cured = not standstill(spec, starts, seed, on_counts=True).hunts
     if dead_band and found.hunts:
         band = least_band(spec, found, spec.method.in_position, _part(told, 0.3, 0.6))
+    if ensemble.earlier is not None:
+        name, before = ensemble.earlier
+        earlier = name, standstill(before, starts, seed, longest=EARLIER, progress=_part(told, 0.3, 0.6))
     assumed = list[tuple[float, float, Standstill]]()
     if not ensemble.stated:
         for ratio in RATIOS:
@@ -317,4 +364,4 @@ def hunt(  # noqa: PLR0913 - what may be asked
     if map_it:
         gain = value_of(spec, ensemble.integral)
         made = band_map(spec, found, gain, _part(told, 0.7, 0.95))
-    return Hunted(file, found, cured, band, made, assumed)
+    return Hunted(file, found, cured, band, made, earlier, assumed)

@@ -12,15 +12,16 @@ from detent.axisfile.tolerance import Tolerance
 from detent.errors import DetentError
 from detent.files.fields import held_leaves, type_of, unit_of
 from detent.files.findings import Caution
-from detent.files.patch import Change, NewValue, patch
+from detent.files.patch import NewValue
 from detent.files.problems import dotted, format_value
-from detent.files.screen import Block, OnScreen, Screen
-from detent.files.text import check_target, did_you_mean, write_text
+from detent.files.screen import Block, Screen
+from detent.files.text import check_target, did_you_mean
 from detent.methods.load import AxisFile
 from detent.methods.method import untold
 from detent.methods.registry import METHODS
 from detent.methods.tuning import Bounds, Share
 from detent.tune.choice import FEWEST, Chooser, Guaranteed, Progress, value_of
+from detent.tune.chosen import Chosen
 from detent.tune.plants import Plants
 from detent.tune.stand import Stand
 
@@ -38,7 +39,7 @@ RANKED = 2  # intervals of which is told what they would be worth
 
 
 @dataclass(frozen=True, repr=False)
-class Tuned(OnScreen):
+class Tuned(Chosen):
     """What `detent tune` has found.
 
     Attributes
@@ -68,6 +69,11 @@ class Tuned(OnScreen):
     refusals: Sequence[Caution]
     shares: Sequence[Share]
     chooser: Chooser = field(compare=False)
+
+    @property
+    def file(self) -> AxisFile:
+        """The axis with the gains of its file."""
+        return self.before.file
 
     @property
     def typed(self) -> dict[str, float]:
@@ -152,55 +158,14 @@ class Tuned(OnScreen):
         seen = f", guaranteed over [tolerance] ({len(file.tolerance)} keys)" if file.tolerance else ""
         return f"{name}: gains chosen, {told}{seen}."
 
-    @cached_property
-    def changes(self) -> list[Change]:
-        """What becomes of the axis file."""
-        return self._patched()[1] if self.values else []
-
-    def _patched(self) -> tuple[str, list[Change]]:
-        file = self.before.file
-        if not file.source.content:
-            raise DetentError(
-                f"{file.file}: got an axis without a file; expected: one of a file; try: write it down first"
-            )
-        return patch(file.source.content.decode(), self._new_values(), file.file)
-
-    def _new_values(self) -> list[NewValue]:
+    def new_values(self) -> list[NewValue]:
+        """The gains, with what is said of each in the file."""
         units = {dotted(path): unit_of(field) for path, field, _ in held_leaves(self.before.file.spec)}
         note = f"Ms {(self.after or self.before).told} ({self.before.told} before)"
         if self.before.file.tolerance and self.done:
             note += f", guaranteed {self.bounds.sensitivity:g} over [tolerance]"
         why = {one.key: one.why.partition(": ")[2].rstrip(".") for one in self.shares}
         return [NewValue(key, value, units[key], why.get(key, note), "tuned") for key, value in self.values.items()]
-
-    def save(self, path: str | Path, *, force: bool = False) -> Path:
-        """Write the axis file with the gains; all else of its text stays.
-
-        Parameters
-        ----------
-        path : path
-            TOML file; that of the axis itself, or a new one.
-        force : bool
-            Replace another file that detent did not write.
-
-        Returns
-        -------
-        Path
-            The file.
-
-        Raises
-        ------
-        DetentError
-            There are no gains, or the file cannot be written.
-        """
-        if not self.values:
-            raise DetentError(
-                f"{self.before.file.file}: got no gains; expected: gains that keep the bounds; see why not"
-            )
-        own = Path(self.before.file.file)
-        is_own = own.exists() and Path(path).exists() and own.samefile(path)
-        target = check_target(path, (".toml",), "an axis", force=force or is_own)
-        return write_text(target, self._patched()[0], force=force or is_own)
 
     @property
     def rows(self) -> list[tuple[str, str, str]]:

@@ -38,7 +38,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(dead_band, "INTEGRALS", (0.0, 1.0, 2.0))
     monkeypatch.setattr(dead_band, "MAP_STARTS", 2)
     monkeypatch.setattr(hunted, "TABLE_STARTS", 1)
-    monkeypatch.setattr(hunted, "LEAST_STARTS", 3)
+    monkeypatch.setattr(CascadeEnsemble, "fewest", 3)
     monkeypatch.setattr(
         standstill.standstill, "__kwdefaults__", standstill.standstill.__kwdefaults__ | {"longest": 4.0}
     )
@@ -163,7 +163,7 @@ def test_what_is_out_of_range_is_refused(words, told):
 def test_a_method_that_is_not_watched_says_so():
     done = run(str(EXAMPLES / "print_head.toml"), "--json")
     assert done.exit_code == 2
-    assert "not watched at standstill" in json.loads(done.stdout)["error"]
+    assert "closes no loop at rest" in json.loads(done.stdout)["error"]
 
 
 @pytest.mark.parametrize("words", [{"dead_band": True}, {"map_it": True}])

@@ -20,7 +20,7 @@ from detent.methods.cascade.loop import LinearLoop
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.standstill_steps import Watch, watch_standstill
 from detent.methods.cascade.system import Cascade, along, latch_both, switch_on
-from detent.methods.tuning import COLUMNS, Rule, Swing
+from detent.methods.tuning import COLUMNS, Ensemble, Rule, Swing
 from detent.sensing.position_sensor import stand_sensor
 
 Numbers = NDArray[np.float64]
@@ -89,7 +89,7 @@ class CascadeCourse:
         return rows
 
 
-class CascadeEnsemble:
+class CascadeEnsemble(Ensemble):
     """What `hunt` asks of a cascade axis."""
 
     band = "method.dead_band"

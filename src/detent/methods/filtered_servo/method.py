@@ -41,6 +41,7 @@ class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
     signals, timing = SIGNALS, TIMING
     linear_loops = "derive:linear_loops"
     tunes = "tuning:FilteredTuning"
+    stands = "standstill:FilteredEnsemble"
     leaves_out = ("Neglected: saturation, quantization, friction that is not viscous.",)
     lives = "live:live"
     compares = ("comparison:compare_feedback",)

@@ -44,6 +44,7 @@ class PhaseServoMethod(MoveMethod[PhaseServoSpec]):
     every = 256
     seed = "detector.seed"
     signals, timing = SIGNALS, TIMING
+    searches, stands = "tuning:PhaseSearch", "standstill:PhaseEnsemble"
     lives = "live:live"
     compares = "comparison:compare_noise", "comparison:compare_hold"
     commands, shows = "host:PhaseHost", "page:PhaseView"
@@ -85,3 +86,7 @@ class PhaseServoMethod(MoveMethod[PhaseServoSpec]):
     def sample_job(self, spec: PhaseServoSpec) -> MoveJob:
         """Six pitches."""
         return one_move("one move of 6 pitches", 6 * spec.pitch, 0.05)
+
+    def trial_job(self, spec: PhaseServoSpec) -> MoveJob:
+        """Three moves, short and long, to both sides."""
+        return self.brought("tuning:three_moves")(spec)

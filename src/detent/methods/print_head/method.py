@@ -31,7 +31,9 @@ class PrintHeadMethod(Method[PrintHeadSpec]):
         "controller.head.drive_cmd", "plant.timer.pulse", "lines.right_left", "lines.transition", "plant.train.current",
     )  # fmt: skip
     takes, reads, runs = "print_job:PrintJob", "print_job:load_job", "run:print_job"
+    searches = "tuning:HeadSearch"
     lives = "live:live"
+    rests = "its drive is off there, and friction holds the carriage"
     compares = ("comparison:compare_drives",)
     sums_up, reports = "page:summary_rows", "page:print_page"
     says = "Printed {job} on {axis}.", "Not printed: {failure}"
@@ -42,3 +44,7 @@ class PrintHeadMethod(Method[PrintHeadSpec]):
         """One word."""
         del spec
         return self.brought("print_job:parse_text")("detent", "one word")
+
+    def trial_job(self, spec: PrintHeadSpec) -> "PrintJob":
+        """Lines long and short."""
+        return self.brought("tuning:four_lines")(spec)

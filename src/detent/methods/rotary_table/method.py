@@ -34,6 +34,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     takes, reads, runs = "sequence_job:SequenceJob", "sequence_file:load_sequence", "run:run_sequence"
     linear_loops = "derive:linear_loops"
     tunes = "tuning:TableTuning"
+    stands = "standstill:TableEnsemble"
     leaves_out = ("Neglected: saturation, quantization, friction that is not viscous.",)
     lives = "live:live"
     compares = ("comparison:compare_angle",)

@@ -40,6 +40,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     every = 100
     takes, runs = "stage_job:StageJob", "run:run_stage"
     lives = "live:live"
+    rests = "the field of its windings holds the rotor"
     sums_up, reports = "summary:stage_summary_rows", "page:stage_page"
     says = "{job}: every move arrived on {axis}, no step was lost.", "Not done: {failure}"
 

@@ -134,5 +134,5 @@ def test_a_method_that_is_not_watched_says_so():
     from detent.methods.registry import METHODS
 
     spec = detent.load(detent.example("print_head.toml")).spec
-    with pytest.raises(DetentError, match="not watched at standstill"):
+    with pytest.raises(DetentError, match="closes no loop at rest"):
         METHODS[spec.axis.method].standstill(spec)
