@@ -1684,43 +1684,23 @@ def test_38_the_ring_is_kept_from_two_seconds_before_to_two_after(period):
         bench.host.faults.trace(2)
 
 
-RUNS = {  # what a fault-free hour consists of: a motion there and back, again and again
-    "cascade": 0.1, "filtered_servo": 0.05, "phase_servo": 0.05, "rotary_table": 0.0, "print_head": 0.05, "zoom": 0.01,
-}  # fmt: skip
-
-
-def false_alarms(name: str, seconds: float) -> tuple[int, int]:
-    """Faults and motions of an example that nothing is wrong with, in a time of the axis [s]."""
-    rig = live_faults.rig(name)
-    rig.bring("rest")
-    host, motions, jogs = rig.host, 0, name == "rotary_table"
-    begun, before = int(host.board.loop.periods), int(host.board.faults.count)
-    way = RUNS[name] if rig.operation.answer.commanded < 0.2 else -RUNS[name]
-    while (host.board.loop.periods - begun) * host.board.loop.period < seconds * 1e9:
-        ending = rig.ask(*((ops.GO, 1 + motions % 3) if jogs else (ops.MOVE_BY, way)))
-        assert ending is not None
-        assert ending.how == ops.DONE, (name, motions, ending)
-        way, motions = -way, motions + 1
-    return int(host.board.faults.count) - before, motions
-
-
 @pytest.mark.parametrize("name", ["cascade", "filtered_servo", "rotary_table"])
 def test_39_a_few_seconds_without_a_fault(name):
-    faults, motions = false_alarms(name, 5.0)
+    faults, motions = live_faults.false_alarms(name, 5.0)
     assert (faults, motions > 2) == (0, True)
 
 
 @pytest.mark.wide
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes of six axes")
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", live_faults.RUNS)
 def test_39_minutes_without_a_fault(name):
-    assert false_alarms(name, 120.0)[0] == 0
+    assert live_faults.false_alarms(name, 120.0)[0] == 0
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", live_faults.RUNS)
 def test_39_an_hour_without_a_fault(name):
-    faults, motions = false_alarms(name, 3600.0)
+    faults, motions = live_faults.false_alarms(name, 3600.0)
     assert (faults, motions > 300) == (0, True)
 
 
