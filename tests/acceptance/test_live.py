@@ -1992,6 +1992,12 @@ def test_47_scope_shows_the_edge_at_its_trigger(tmp_path: Path) -> None:
     np.testing.assert_array_equal(rows[:, 0], ring[:, 0])
     np.testing.assert_array_equal(rows[:, 2:].astype(np.float32), ring[:, 1:].astype(np.float32))
     assert "1/Δt" in found["cursors"]
+    # The velocity over the position: a click at its lower right corner puts a cursor where the move has ended.
+    assert found["xy"]["drawn"] == 1
+    assert found["xy"]["label"] == found["channels"]
+    places, (_, cursor) = rows[:, 2 + found["channels"].index("position")], found["xy"]["cursors"]
+    at = round(cursor * (len(rows) - 1))
+    assert places[at] > places[0] + 0.95 * (places[-1] - places[0])
 
 
 @in_wall_time
