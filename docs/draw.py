@@ -13,6 +13,7 @@ import figures
 import figures_cascade
 import figures_course
 import figures_house
+import figures_live
 import figures_rotary
 import figures_servos
 import figures_steppers
@@ -21,6 +22,7 @@ from PIL import Image
 
 MODULES = (
     figures, figures_servos, figures_rotary, figures_steppers, figures_cascade, figures_course, figures_house,
+    figures_live,
 )  # fmt: skip
 DOCS = Path(__file__).resolve().parent
 KEPT = DOCS / "_static" / "figures"

@@ -275,6 +275,25 @@ def cells(name: str, states: tuple[str, ...] = STATES) -> Iterator[tuple[str, st
         yield from ((place, kind, state) for kind in kinds for state in states)
 
 
+RUNS = {  # what a fault-free hour consists of: a motion there and back, again and again
+    "cascade": 0.1, "filtered_servo": 0.05, "phase_servo": 0.05, "rotary_table": 0.0, "print_head": 0.05, "zoom": 0.01,
+}  # fmt: skip
+
+
+def false_alarms(name: str, seconds: float) -> tuple[int, int]:
+    """Faults and motions of an example that nothing is wrong with, in a time of the axis [s]."""
+    one = rig(name).bring("rest")
+    host, motions, jogs = one.host, 0, name == "rotary_table"
+    begun, before = int(host.board.loop.periods), int(host.board.faults.count)
+    way = RUNS[name] if one.operation.answer.commanded < 0.2 else -RUNS[name]
+    while (host.board.loop.periods - begun) * host.board.loop.period < seconds * 1e9:
+        ending = one.ask(*((ops.GO, 1 + motions % 3) if jogs else (ops.MOVE_BY, way)))
+        assert ending is not None
+        assert ending.how == ops.DONE, (name, motions, ending)
+        way, motions = -way, motions + 1
+    return int(host.board.faults.count) - before, motions
+
+
 @cache
 def run(name: str) -> tuple[Cell, ...]:
     """Every cell of an example."""

@@ -1,8 +1,11 @@
-"""Kills of a live host that keeps its store while its axis moves: ``python -m tests.live_kills KILLS SEED FOLDER``.
+"""Kills of a live host that keeps its store while its axis moves: ``python -m tests.live_kills KILLS``.
 
 The host is that of `detent live`: its loop in a thread, in wall time, its store kept from another, commands asked in
 words. What is killed with it is everything but the machine: the registers of the simulated axis lie in shared memory,
 and where it stands there is the truth that no start may miss.
+
+A host lives for a fifth of a second, most of which it waits: so that the processors do not, several machines run side
+by side, each with a store, a seed and hosts of its own. All are forks of one process in which everything is compiled.
 """
 
 import gc
@@ -12,6 +15,7 @@ import os
 import signal
 import sys
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,9 +35,10 @@ from detent.operate.session import Session
 from detent.operate.store import Store
 from detent.operate.trust import Trust
 from tests.acceptance.test_golden_bits import EXAMPLES
-from tests.live_rig import SENSORS, TRAVEL, Model, open_store, read, table_change, table_of
+from tests.live_rig import SENSORS, TRAVEL, Model, memory_folder, open_store, read, table_change, table_of
 
 LONGEST = 0.2  # life of a host, from its start or its first motion [s]
+MACHINES = 4 * (os.cpu_count() or 1)  # side by side
 SPEED = 10.0  # how fast time passes on its axis
 EXAMPLE = EXAMPLES / "cascade.toml"
 OVERRIDES = (f"limits.travel={TRAVEL} um", "limits.speed=50 mm/s", "mechanics.start_position=5 mm")
@@ -168,10 +173,8 @@ def look(path: Path, made: PositionSensor, machine: Machine, model: Model) -> tu
     return judged.why.name, model
 
 
-def kill_many(kills: int, seed: int, folder: Path) -> dict[str, int]:
+def kill_many(kills: int, seed: int, folder: Path) -> Counter[str]:
     """Kills of hosts with each kind of sensor; how often each judgement came, and how many changes were kept."""
-    Machine(seed).host(None, wall=False).run(1)  # compiled before there are processes that need it
-    gc.freeze()
     told: Counter[str] = Counter()
     for number, (name, made) in enumerate(SENSORS.items()):
         machine, random, model = Machine(seed), Random(f"{seed} {name}"), Model()
@@ -188,8 +191,39 @@ def kill_many(kills: int, seed: int, folder: Path) -> dict[str, int]:
             told["in motion or ready"] += machine.ready
             machine.ready = 0
         told["changes"] += known
-    return dict(told)
+    return told
+
+
+def kill_by_all(kills: int, machines: int = MACHINES) -> Counter[str]:
+    """So many kills, of hosts of several machines at a time; a machine that finds what may not be ends all."""
+    Machine(0).host(None, wall=False).run(1)  # compiled before there are processes that need it
+    gc.freeze()
+    told: Counter[str] = Counter()
+    with memory_folder() as folder:
+        pipes = [begin(seed, -(-kills // machines), folder / str(seed)) for seed in range(machines)]
+        answers = [os.fdopen(pipe).read() for _, pipe in pipes]
+    ends = [os.waitpid(child, 0)[1] for child, _ in pipes]
+    assert not any(ends), "a machine has found what may not be: see above"
+    for answer in answers:
+        told.update(json.loads(answer))
+    return told
+
+
+def begin(seed: int, kills: int, folder: Path) -> tuple[int, int]:
+    """A machine in a process of its own, and the pipe that it tells its counts by."""
+    heard, telling = os.pipe()
+    child = os.fork()
+    if child:
+        os.close(telling)
+        return child, heard
+    try:
+        folder.mkdir()
+        os.write(telling, json.dumps(kill_many(kills, seed, folder)).encode())
+        os._exit(0)
+    finally:
+        traceback.print_exc()
+        os._exit(70)
 
 
 if __name__ == "__main__":
-    print(json.dumps(kill_many(int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3]))))  # noqa: T201
+    print(json.dumps(kill_by_all(int(sys.argv[1]))))  # noqa: T201

@@ -15,7 +15,7 @@ from detent.methods.registry import METHODS
 from detent.operate.opening import meanings
 from detent.operate.store import Store
 from detent.operate.trust import Trust, Why
-from tests.live_rig import SENSORS, memory_folder, open_store, read, table_of
+from tests.live_rig import SENSORS, open_store, read, table_of
 from tests.places import ROOT
 from tests.power_cut import RecordingDisk, images
 
@@ -23,16 +23,11 @@ RANK = {Trust.UNKNOWN: 0, Trust.RESTORED: 1, Trust.REFERENCED: 2}
 
 
 def kill(kills: int) -> Counter[str]:
-    """Kills by two processes that do nothing else; whatever is not as it must be ends one of them."""
-    with memory_folder() as one, memory_folder() as other:
-        command = [sys.executable, "-m", "tests.live_kills", str(kills // 2)]
-        started = [
-            subprocess.Popen([*command, str(seed), str(folder)], cwd=ROOT, stdout=subprocess.PIPE, text=True)
-            for seed, folder in enumerate((one, other))
-        ]
-        told = sum((Counter(json.loads(process.communicate()[0] or "{}")) for process in started), Counter())
-        assert [process.returncode for process in started] == [0, 0]
-    return told
+    """Kills by a process that does nothing else; whatever is not as it must be ends it."""
+    command = [sys.executable, "-m", "tests.live_kills", str(kills)]
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 0
+    return Counter(json.loads(done.stdout))
 
 
 def check_kills(told: Counter[str]) -> None:

@@ -34,6 +34,7 @@ class Keeper:
         self._trust = ops.NOT_KNOWN  # as the store has it
         self._asked = 0  # last request that may give torque
         self._marked = True  # as far as it is known, the axis may be in motion
+        self._still_with: int = 0  # that request when it was first seen still and without torque; -1 it has torque
         self._last = self._parked = 0  # counts: where it was seen last, and where it was parked
         self._since = self._looked = self._fault = 0  # periods: since when it is still, and of the last look
         self._counted = dict.fromkeys(("moves", "distance", "enabled", "faults"), 0.0)
@@ -103,22 +104,29 @@ class Keeper:
             self._asked = int(self._board.inbox.written)
 
     def look(self) -> bool:
-        """Keep what has changed; gives whether the axis is parked."""
+        """Keep what has changed; gives whether the axis is parked.
+
+        The loop goes on while it is looked at, and a busy machine may hold up these lines anywhere. So the order
+        counts: the time before the axis, requests before the state that comes of them, the state before the place. Two
+        looks that find no torque, the same place, and no request for torque between them, have an axis that stood.
+        """
         with self.lock, self.kept():
-            o, loop, counts = self._board.operation, self._board.loop, self._counts()
+            o, loop = self._board.operation, self._board.loop
             now, trust = int(loop.periods), int(o.trust)
+            powered = int(o.taken) < self._asked or int(o.state) in POWERED
+            counts, far = self._counts(), self.store.sensor.window
+            moved: bool = powered or self._asked != self._still_with or abs(counts - self._last) > far
             self._note(o, counts, (now - self._looked) * loop.period * 1e-9)
             if trust != self._trust:
                 self._trust = trust
                 self._follow(trust, counts)
-            far = self.store.sensor.window
-            if abs(counts - self._last) > far or o.state in POWERED or o.taken < self._asked:
-                self._last, self._since = counts, now
-            if self._marked and (now - self._since) * loop.period * 1e-9 >= STILL:
+            if moved:
+                self._last, self._still_with, self._since = counts, -1 if powered else self._asked, int(loop.periods)
+            elif self._marked and (now - self._since) * loop.period * 1e-9 >= STILL:
                 self.store.parked(self._place(counts), **self._counted)
                 self._counted, self._marked, self._parked = dict.fromkeys(self._counted, 0.0), False, counts
                 self.trouble = ""
-            elif not self._marked and abs(counts - self._parked) > far:  # pushed by hand, or sinking
+            if not self._marked and abs(counts - self._parked) > far:  # pushed by hand, or sinking
                 self.store.moving()
                 self._marked = True
             self._looked = now

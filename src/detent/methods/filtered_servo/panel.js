@@ -26,9 +26,11 @@ export function open(root, { link }) {
     h("dl", { class: "cards" }, pairs.map(({ row }) => row)), said);
   const draw = () => {
     frame = 0;
-    if (rows.next - rows.first < many) return;
-    NAMES.forEach((_name, k) => rows.copy(k, rows.next - many, columns[k + 1]));
-    plot.draw(columns, null, many - 1);
+    const have = Math.min(many, rows.next - rows.first);
+    if (have < 2) return;
+    const newest = columns.map((one) => one.subarray(many - have)); // at first there are not two seconds of it
+    NAMES.forEach((_name, k) => rows.copy(k, rows.next - have, newest[k + 1]));
+    plot.draw(newest, null, have - 1);
     pairs.forEach(({ value }, k) => say(value, String(Number(rows.at(k + 2, rows.next - 1).toPrecision(6)))));
   };
   const onRows = () => {

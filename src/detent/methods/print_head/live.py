@@ -20,6 +20,7 @@ from detent.control.head_computer import (
     NO_OPERATION,
     OBSTRUCTION,
     OK,
+    STATE_NAMES,
     HeadComputer,
     HeadParams,
 )
@@ -480,7 +481,8 @@ def live(spec: PrintHeadSpec, operation: Callable[..., OperationParams]) -> dict
         return HeadWork(spec, made[0], job)
 
     made.append(Live(
-        machine.params, machine.state, q, memory, machine.tick, speed=spec.limits.speed, view={"title": "Print line"},
+        machine.params, machine.state, q, memory, machine.tick, speed=spec.limits.speed,
+        view={"title": "Print line", "data": {"states": STATE_NAMES}},
         fault=fault, tray=tray, work=work, text=parse_text, places=places(), fault_numbers={OBSTRUCTED: SATURATED},
     ))  # fmt: skip
     return {"": made[0]}

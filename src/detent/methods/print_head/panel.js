@@ -5,13 +5,14 @@ import { follow } from "/static/follow.js";
 import { quantity } from "/static/units.js";
 
 const H = "controller.head.";
-const SHOWN = [[`${H}state`, "Motion state (code)"], [`${H}emitter`, "Position (emitters)"], [`${H}speed`, "Speed value (1/6 in/s)"],
+const SHOWN = [[`${H}state`, "Motion"], [`${H}emitter`, "Position (emitters)"], [`${H}speed`, "Speed value (1/6 in/s)"],
   [`${H}drive_cmd`, "Drive (counts)"], [`${H}columns.fired`, "Columns fired"], [`${H}columns.missed`, "Columns missed"],
-  [`${H}queue.waiting`, "Bytes waiting"], [`${H}columns.active`, "Prints"]];
+  [`${H}queue.waiting`, "Bytes waiting"], [`${H}columns.active`, "Prints (1: yes)"]];
 const [LEFT, RIGHT] = [20, 560];
 
 export function open(root, { link }) {
   const { unit, limits } = link.about;
+  const { states } = link.about.view.data;
   const place = (x) => LEFT + ((RIGHT - LEFT) * (x - limits[0])) / (limits[1] - limits[0]);
   const head = h("path", { d: "M-12 58 h24 v-22 l-12 -12 l-12 12 z", class: "dot" });
   const wanted = h("line", { x1: 0, x2: 0, y1: 18, y2: 70, class: "ref" });
@@ -28,7 +29,7 @@ export function open(root, { link }) {
     h("dl", { class: "cards" }, rows.map(([, { row }]) => row)), said);
   const leave = follow(link, SHOWN.map(([name]) => name), (values) => {
     if (values.error) return say(said, values.error);
-    for (const [name, { value }] of rows) say(value, String(values[name]));
+    for (const [name, { value }] of rows) say(value, name === `${H}state` ? states[values[name]] ?? "?" : String(values[name]));
     const now = values[`${H}columns.fired`];
     if (!values[`${H}columns.active`]) line = "";
     else if (fired !== null && now > fired) line = `${line.slice(-4000)}M${at.toFixed(1)} 76V84`;

@@ -37,13 +37,19 @@ export function open(root, { link, act, tell }) {
     channels = wanted;
     rows = new Rows(wanted);
     [record, reference] = [null, null];
-    plot.show(wanted.map((name) => ({ name, unit: shown(about(name).unit).name })));
+    lay();
     try {
       await link.watch(wanted);
       arm();
     } catch (error) {
       say(said, error.message);
     }
+  }
+
+  /** Over time, or one channel over another. */
+  function lay() {
+    plot.show(channels.map((name) => ({ name, unit: shown(about(name).unit).name })), ui.axes(channels));
+    show();
   }
 
   function arm() {
@@ -121,6 +127,10 @@ export function open(root, { link, act, tell }) {
   ui.arm.addEventListener("click", single);
   ui.root.addEventListener("change", (event) => {
     if (event.target.type === "search") return;
+    if (ui.isView(event.target)) {
+      lay(); // of the record that is there
+      return;
+    }
     if (event.target.name === "channel") kept.channels = ui.chosen();
     watch();
   });

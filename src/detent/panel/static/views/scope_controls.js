@@ -43,15 +43,28 @@ export function controls(all, chosen) {
   const level = h("input", { type: "text", id: "trigger-level", inputmode: "decimal", value: "1", autocomplete: "off" });
   const before = choice([[0, "0 %"], [0.1, "10 %"], [0.25, "25 %"], [0.5, "50 %"], [0.75, "75 %"], [0.9, "90 %"]], 0.5, { id: "trigger-before" });
   const seconds = choice(TIMES.map((one) => [one, `${one} s`]), 2, { id: "scope-time" });
+  const across = choice([["", "over time"], ["xy", "one over another (XY)"]], "", { id: "scope-view" });
+  const [x, y] = ["x", "y"].map((name) => h("select", { id: `scope-${name}` }));
+  const lie = h("div", { class: "fields", hidden: true }, field("Across", x), field("Up", y));
   const single = h("input", { type: "checkbox", id: "scope-single" });
   const button = (id, text) => h("button", { id, type: "button", class: "plain" }, text);
   const [run, arm, overlay, csv] = [button("scope-run", "Freeze"), button("scope-arm", "Single"), button("scope-overlay", "Keep as overlay"), button("scope-csv", "CSV")];
   const root = h("div", { class: "scope-controls" },
-    h("div", { class: "fields" }, field("Time", seconds), field("Trigger", kind), field("Channel", source), field("Slope or side", rising), field("Level", level),
+    h("div", { class: "fields" }, field("Drawn", across), lie, field("Time", seconds), field("Trigger", kind), field("Channel", source), field("Slope or side", rising), field("Level", level),
       field("Before the trigger", before), h("label", { class: "box" }, single, " one record, then freeze")),
     h("details", { open: true }, h("summary", {}, `Channels, ${MOST} at most`), field("Find a register of the axis", find), boxes));
   return {
     root, buttons: h("div", { class: "line" }, run, arm, overlay, csv), run, arm, overlay, csv, single, chosen: () => [...names],
+    isView: (one) => [across, x, y].includes(one),
+    /** Numbers of the channels that lie across and up; null: over time. What is not watched any more gives way. */
+    axes: (channels) => {
+      [[x, channels[0]], [y, channels[channels.length - 1]]].forEach(([list, first]) => {
+        const held = channels.includes(list.value) ? list.value : first;
+        fill(list, channels.map((name) => h("option", { value: name, selected: name === held }, name)));
+      });
+      lie.hidden = !across.value;
+      return across.value && channels.length ? [channels.indexOf(x.value), channels.indexOf(y.value)] : null;
+    },
     isSingle: () => single.checked,
     seconds: () => Number(seconds.value),
     before: () => Number(before.value),
