@@ -711,7 +711,7 @@ def test_36_workers_of_dask_give_the_same_bytes_though_one_is_killed(tmp_path, m
     here = run_chunk(question, 0, 100)
     killed = partial(run_killed, at=40, once=str(tmp_path / "once"))
     for run in (run_chunk, killed):
-        found = dict(workers.on_dask(run, question, spans, "local:2"))
+        found = dict(workers.computed(workers.dask("local:2"), run, question, spans))
         there = store.joined([found[span] for span in spans], 100)
         for kind in ("values", "results"):
             for name, values in getattr(here, kind).items():
@@ -720,7 +720,7 @@ def test_36_workers_of_dask_give_the_same_bytes_though_one_is_killed(tmp_path, m
     assert (tmp_path / "once").exists()
     monkeypatch.setattr(workers, "source_hash", lambda: "0123")
     with pytest.raises(DetentError, match=r"the worker tcp://.* has source hash .*; expected: 0123"):
-        list(workers.on_dask(run_chunk, question, spans, "local:1"))
+        list(run_chunks(question, spans, dask="local:1"))
 
 
 @pytest.mark.compiled
@@ -817,7 +817,7 @@ def test_34_a_case_is_the_same_in_any_chunk(tmp_path):
     alone = case_of(run_chunk(question, 4711, 1), 4711)
     assert case_of(run_chunk(question, 4700, 40), 4711) == alone
     for threads in (1, 2):
-        chunks = list(run_chunks(question, [(4690, 10), (4700, 17)], threads))
+        chunks = sorted(run_chunks(question, [(4690, 10), (4700, 17)], threads), key=lambda one: one.first)
         assert [one.first for one in chunks] == [4690, 4700]
         assert case_of(chunks[1], 4711) == alone
     more = run_chunk(asked(tmp_path, SLIDE + '"method.timeout" = "10 %"\n'), 4711, 1)

@@ -6,12 +6,10 @@ Nothing here is a closure: chunks may be made in threads, in processes of this m
 
 import math
 import os
-from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -19,11 +17,12 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError, InputError
 from detent.methods.batch import kind_of, refusal_of
+from detent.tune import workers as crew
 from detent.tune.cases import Limit, Numbers, Question, draw
 
 __all__ = [
-    "Chunk", "Limit", "Quantity", "Question", "chunks_of", "default_limits", "draw", "quantities", "run_chunk",
-    "run_chunks",
+    "Chunk", "Limit", "Quantity", "Question", "chunk_size", "chunks_of", "default_limits", "draw", "quantities",
+    "run_chunk", "run_chunks",
 ]  # fmt: skip
 
 CHUNK, CHUNK_ALONE = 1000, 50  # cases of a chunk: of a method that makes many at once, of one that makes each alone
@@ -161,32 +160,29 @@ def make_cases(
 # ---- many chunks
 
 
-def chunks_of(question: Question, count: int, size: int = 0) -> list[tuple[int, int]]:
+def chunk_size(question: Question) -> int:
+    """Cases of a chunk: a second's work or so."""
+    return CHUNK if question.method.batches else CHUNK_ALONE
+
+
+def chunks_of(question: Question, count: int, size: int = 0) -> list[crew.Span]:
     """First case and number of cases of each chunk of so many cases."""
-    is_batch = question.method.batch(question.file.spec, question.job) is not None
-    size = size or (CHUNK if is_batch else CHUNK_ALONE)
+    size = size or chunk_size(question)
     return [(first, min(size, count - first)) for first in range(0, count, size)]
 
 
-def run_chunks(question: Question, chunks: Iterable[tuple[int, int]], workers: int = 0) -> Iterator[Chunk]:
-    """Make some chunks, given by first case and number of cases, side by side, and give them in their order.
+def run_chunks(question: Question, chunks: Iterable[crew.Span], workers: int = 0, dask: str = "") -> Iterator[Chunk]:
+    """Make some chunks, given by first case and number of cases, side by side, and give them as they are done.
 
-    Workers are threads of this process where a chunk is one compiled loop, else processes; 0: one for each core. At
-    most twice as many chunks as workers are under way.
+    Workers are threads of this process where a chunk is one compiled loop, else processes; 0: one for each processor.
+    With an address of a Dask scheduler its workers make them.
     """
-    workers = workers or os.cpu_count() or 1
-    is_batch = question.method.batch(question.file.spec, question.job) is not None
+    spans = list(chunks)
+    if not spans:
+        return
     quantities(question)  # every thread finds it done, and what is compiled
-    pool = ThreadPoolExecutor(workers) if is_batch else ProcessPoolExecutor(workers, get_context("spawn"))
-    waiting, left = deque[Future[Chunk]](), iter(chunks)
-    with pool:
-        try:
-            for first, count in left:
-                waiting.append(pool.submit(run_chunk, question, first, count))
-                if len(waiting) >= 2 * workers:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:
-            for one in waiting:
-                one.cancel()
+    number = min(workers or os.cpu_count() or 1, len(spans))
+    hands = crew.threads if question.method.batches or number == 1 else crew.processes
+    with closing(crew.computed(crew.dask(dask) if dask else hands(number), run_chunk, question, spans)) as found:
+        for _, chunk in found:
+            yield chunk

@@ -18,13 +18,12 @@ from detent.files.text import check_target
 from detent.methods.load import AxisFile
 from detent.methods.method import untold
 from detent.record.machine import Progress
-from detent.tune import workers as crew
-from detent.tune.batch import DONE, Chunk, Question, default_limits, quantities, run_chunk
+from detent.tune.batch import DONE, Chunk, Question, chunk_size, default_limits, quantities, run_chunk, run_chunks
 from detent.tune.judged import Figure, Judged, Yield, parse_limit
-from detent.tune.store import SIZE, Store, joined, opened
+from detent.tune.store import Store, joined, opened
+from detent.tune.workers import machine
 from detent.units import format_quantity
 
-SLOW_SIZE = 50  # cases of a chunk where each machine is run for itself: a second or so
 TRIED = 20  # cases that tell how long all will take
 LONGEST = 3600.0  # that is done unasked [s]
 MOST = 10_000_000  # cases
@@ -224,9 +223,9 @@ def _trial_job(file: AxisFile) -> Any:
 @contextmanager
 def _held(question: Question, folder: Path | None) -> Generator["_Held"]:
     """The cases that are there already; what is judged by which limits changes none of them."""
-    size = SIZE if question.method.batches else SLOW_SIZE
+    size = chunk_size(question)
     with ExitStack() as stack:
-        about = {"hash": question.hash, **question.to_dict(), "made on": crew.machine()}
+        about = {"hash": question.hash, **question.to_dict(), "made on": machine()}
         store = None if folder is None else stack.enter_context(opened(folder, about, size))
         yield _Held(question, store, store.size if store else size)
 
@@ -245,9 +244,9 @@ class _Held:
             _check_time(self.question, sum(count for _, count in missing), means)
         began, total, ready = means.clock(), cases, cases - sum(count for _, count in missing)
         before = ready
-        for (first, count), chunk in self._computed(missing, means):
-            self._keep(first, chunk)
-            ready += count
+        for chunk in run_chunks(self.question, missing, means.workers, means.dask):
+            self._keep(chunk)
+            ready += chunk.count
             left = (means.clock() - began) * (total - ready) / (ready - before)
             progress(ready / total, f"{ready} of {total} cases, {left:.0f} s left")
         return joined([self.chunks[first] for first in range(0, cases, self.size)], cases)
@@ -263,22 +262,13 @@ class _Held:
             if there < wanted:
                 yield first + there, wanted - there
 
-    def _keep(self, first: int, chunk: Chunk) -> None:
+    def _keep(self, chunk: Chunk) -> None:
         """Take a chunk, behind what was there of it."""
-        place = first - first % self.size
-        whole = joined([self.chunks[place], chunk], self.size) if first > place else chunk
+        place = chunk.first - chunk.first % self.size
+        whole = joined([self.chunks[place], chunk], self.size) if chunk.first > place else chunk
         self.chunks[place] = whole
         if self.store:
             self.store.keep(place, whole)
-
-    def _computed(self, spans: Sequence[crew.Span], means: Means) -> crew.Computed:
-        if not spans:
-            return iter(())
-        if means.dask:
-            return crew.on_dask(run_chunk, self.question, spans, means.dask)
-        number = min(means.workers or cpu_count() or 1, len(spans))
-        able = crew.in_threads if self.question.method.batches or number == 1 else crew.in_processes
-        return able(run_chunk, self.question, spans, number)
 
 
 def _check_time(question: Question, cases: int, means: Means) -> None:
