@@ -6,6 +6,7 @@ Nothing here is a closure: chunks may be made in threads, in processes of this m
 
 import math
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
@@ -26,7 +27,11 @@ __all__ = [
 ]  # fmt: skip
 
 CHUNK, CHUNK_ALONE = 1000, 50  # cases of a chunk: of a method that makes many at once, of one that makes each alone
+CHUNK_WATCHED = 5  # and where each is watched at standstill, too
+STARTS = 8  # of each at standstill
 DONE = "done"  # the quantity that every case has: 1 or 0
+HUNTS = "hunts at rest"  # share of the starts of a machine that hunt
+SWING = "swing at rest"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +41,14 @@ class Quantity:
     name: str
     unit: str  # SI; empty for a pure number
     nominal: float  # of case 0
+
+
+_OF_A_MOVE = re.compile(r"move \d+ ")
+
+
+def is_of_a_move(one: Quantity) -> bool:
+    """True of what one move of several does."""
+    return _OF_A_MOVE.match(one.name) is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,23 +80,23 @@ def quantities(question: Question) -> tuple[Quantity, ...]:
     told: Any = getattr(spec, "unit", str)
     figures = {name: value for name, value in result.figures().items() if not (result.done and math.isnan(value))}
     found = [Quantity(name, told(units.get(name.split(" ")[-1], "")), value) for name, value in figures.items()]
-    if question.margins:
-        found += [Quantity(name, _margin_unit(name), value) for name, value in _margins(question, spec).items()]
-    return tuple(found)
+    return (*found, *(Quantity(name, unit, value) for name, (value, unit) in _looked_at(question, spec).items()))
 
 
-def _margins(question: Question, spec: Any) -> dict[str, float]:
-    """Margins of the loops of an axis, where each is cut."""
-    found = dict[str, float]()
-    for cut, one in question.method.linear(spec).margins.items():
-        found |= {
-            f"Ms at {cut}": one.sensitivity, f"phase margin at {cut}": one.phase, f"gain margin at {cut}": one.gain,
-        }  # fmt: skip
+def _looked_at(question: Question, spec: Any) -> dict[str, tuple[float, str]]:
+    """What an axis is beside its job, where that is asked: margins of its loops where each is cut, and hunting."""
+    found = dict[str, tuple[float, str]]()
+    for cut, one in question.method.linear(spec).margins.items() if question.margins else ():
+        found[f"Ms at {cut}"] = one.sensitivity, ""
+        found[f"phase margin at {cut}"] = one.phase, "rad"
+        found[f"gain margin at {cut}"] = one.gain, ""
+    if question.hunt:
+        from detent.tune.standstill import HUNTS as HUNTING
+        from detent.tune.standstill import standstill
+
+        stood = standstill(spec, STARTS, question.seed)
+        found |= {HUNTS: (stood.shares[HUNTING], ""), SWING: (stood.swing, stood.ensemble.unit)}
     return found
-
-
-def _margin_unit(name: str) -> str:
-    return "rad" if name.startswith("phase") else ""
 
 
 def default_limits(question: Question) -> tuple[Limit, ...]:
@@ -91,7 +104,8 @@ def default_limits(question: Question) -> tuple[Limit, ...]:
     from detent.axisfile.tolerance import value_of
 
     kept = {name: value_of(question.file.spec, key) for name, key in _nominal(question).kept_by.items()}
-    return (Limit(DONE, 1.0, least=True), *(Limit(name, value) for name, value in kept.items()))
+    rests = (Limit(HUNTS, 0.0),) if question.hunt else ()
+    return (Limit(DONE, 1.0, least=True), *(Limit(name, value) for name, value in kept.items()), *rests)
 
 
 def run_case(question: Question, values: Mapping[str, float]) -> tuple[dict[str, float], str]:
@@ -114,8 +128,8 @@ def run_chunk(question: Question, first: int, count: int) -> Chunk:
     values = draw(question, first, count)
     names = [one.name for one in quantities(question)]
     found, reasons = make_cases(question, values, count)
-    if question.margins:
-        found |= _all_margins(question, values, reasons, count)
+    if question.margins or question.hunt:
+        found |= _looked_at_all(question, values, reasons, count)
     empty = np.full(count, np.nan)
     return Chunk(
         first, values, {name: found.get(name, empty) for name in names},
@@ -123,15 +137,15 @@ def run_chunk(question: Question, first: int, count: int) -> Chunk:
     )  # fmt: skip
 
 
-def _all_margins(
+def _looked_at_all(
     question: Question, values: Mapping[str, Numbers], reasons: Mapping[int, str], count: int
 ) -> dict[str, Numbers]:
-    """Margins of the loops of each machine that did the job."""
+    """What each machine that did the job is beside it."""
     found = dict[str, Numbers]()
     for k in range(count):
         if k not in reasons:
             spec = question.machine({key: float(each[k]) for key, each in values.items()}).spec
-            for name, value in _margins(question, spec).items():
+            for name, (value, _) in _looked_at(question, spec).items():
                 found.setdefault(name, np.full(count, np.nan))[k] = value
     return found
 
@@ -162,7 +176,7 @@ def make_cases(
 
 def chunk_size(question: Question) -> int:
     """Cases of a chunk: a second's work or so."""
-    return CHUNK if question.method.batches else CHUNK_ALONE
+    return CHUNK_WATCHED if question.hunt else CHUNK if question.method.batches else CHUNK_ALONE
 
 
 def chunks_of(question: Question, count: int, size: int = 0) -> list[crew.Span]:

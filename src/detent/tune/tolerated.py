@@ -3,32 +3,43 @@
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import cpu_count
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from detent.analysis.sensitivity import Sensitivity, sensitivity
+from detent.analysis.sensitivity import Index, Sensitivity, sensitivity
 from detent.errors import DetentError
 from detent.files.screen import Block, OnScreen, Screen
-from detent.files.text import check_target
+from detent.files.text import check_target, write_errors
 from detent.methods.load import AxisFile
 from detent.methods.method import untold
 from detent.record.machine import Progress
-from detent.tune.batch import DONE, Chunk, Question, chunk_size, default_limits, quantities, run_chunk, run_chunks
-from detent.tune.judged import Figure, Judged, Yield, parse_limit
+from detent.tune.batch import (
+    DONE,
+    STARTS,
+    Chunk,
+    Question,
+    chunk_size,
+    default_limits,
+    quantities,
+    run_chunk,
+    run_chunks,
+)
+from detent.tune.judged import PASSED, Figure, Judged, Yield, parse_limit
 from detent.tune.store import Store, joined, opened
+from detent.tune.total import scheme_of, totals
 from detent.tune.workers import machine
+from detent.tune.worst import Worst, is_sought, worst, write_worst
 from detent.units import format_quantity
 
 TRIED = 20  # cases that tell how long all will take
 LONGEST = 3600.0  # that is done unasked [s]
+MOST_WATCHED = 1000  # cases, at standstill
+WORST = "worst"  # folder of axis files, in the store
 MOST = 10_000_000  # cases
 CAUSES = "What a key explains alone, and its rank correlation"
-PASSED = "passed"  # the quantity that is 1 where all limits are kept
 
 
 @dataclass(frozen=True, repr=False)
@@ -43,11 +54,17 @@ class Tolerated(OnScreen):
         The cases with their values and results, and what of them passes.
     folder : Path or None
         The store.
+    worst : sequence of Worst
+        The worst machine found of each quantity; empty where none was sought.
+    total : mapping
+        Total index of every key by quantity, where it was asked for.
     """
 
     question: Question
     judged: Judged
     folder: Path | None = None
+    worst: Sequence[Worst] = ()
+    total: Mapping[str, Mapping[str, Index]] = field(default_factory=dict[str, Mapping[str, Index]])
 
     @property
     def done(self) -> bool:
@@ -72,8 +89,7 @@ class Tolerated(OnScreen):
     @cached_property
     def sensitivities(self) -> dict[str, Sensitivity]:
         """What each toleranced key does to each quantity that varies, `passed` among them."""
-        outcomes = {one.name: self.cases.results[one.name] for one in self.judged.told if one.name != DONE}
-        outcomes[PASSED] = self.judged.good.astype(np.float64)
+        outcomes = self.judged.outcomes(self.cases)
         found = {name: sensitivity(self.cases.values, outcome) for name, outcome in outcomes.items()}
         return {name: one for name, one in found.items() if one is not None}
 
@@ -106,8 +122,19 @@ class Tolerated(OnScreen):
             found = self.sensitivities[name]
             for key in found.order[:3]:
                 share, rank = found.share[key], found.rank[key]
-                rows.append((name, key, f"{100 * share.value:.0f} %", f"{rank.value:+.2f}"))
+                row = name, key, f"{100 * share.value:.0f} %", f"{rank.value:+.2f}"
+                total = (f"{100 * self.total[name][key].value:.0f} %" if name in self.total else "",)
+                rows.append(row + total if self.total else row)
         return rows
+
+    @property
+    def worst_rows(self) -> list[tuple[str, ...]]:
+        """The worst case of the sample, and what the search from there has found."""
+        units = self.judged.units
+        return [
+            (one.quantity, *(format_quantity(value, units[one.quantity], 3) for value in (one.sampled, one.value)))
+            for one in self.worst
+        ]
 
     @property
     def blocks(self) -> list[Block]:
@@ -117,7 +144,8 @@ class Tolerated(OnScreen):
         return [
             Block("", ("passes", "cases", "yield, 95 % interval"), yields),
             Block("", ("", "nominal", "mean", "5 %", "95 %", "largest"), self.quantity_rows, 14),
-            Block(CAUSES, ("", "key", "share", "rank"), self.cause_rows, 12),
+            Block(CAUSES, ("", "key", "share", "rank", *(["total"] if self.total else [])), self.cause_rows, 12),
+            *([Block("The worst machine found", ("", "sample", "worst"), self.worst_rows, 12)] if self.worst else []),
             *([Block("Why cases fail", ("", "cases", "the first"), failures, 6)] if failures else []),
         ]
 
@@ -152,6 +180,18 @@ class Tolerated(OnScreen):
         write_page(target, tolerance_page(self), force=force)
         return target
 
+    def save(self, path: str | Path, *, force: bool = False) -> Path:
+        """Write a row for each case, in SI units: values, results, whether it passes, and which of `failures` it is.
+
+        The suffix chooses HDF5, CSV or Parquet; `force` replaces a file that is not detent's.
+        """
+        from detent.record.trace_files import Table, save_table
+
+        table = self.judged.table({one.key: one.unit for one in self.question.tolerance})
+        told = {"axis": self.question.file.spec.axis.name, "job": self.question.job.name, "hash": self.question.hash}
+        save_table(Table(*table, {**told, "seed": str(self.question.seed)}), path, force=force)
+        return Path(path)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as ``--json`` prints it."""
         whole = self.yields[0]
@@ -165,7 +205,7 @@ class Tolerated(OnScreen):
             "quantities": {
                 name: {"unit": self.judged.units[name], **one._asdict()} for name, one in self.figures.items()
             },
-            "failures": [one._asdict() for one in self.judged.failures],
+            "failures": [one.to_dict() for one in self.judged.failures],
             "sensitivities": {
                 name: {
                     "share": {key: [index.value, index.low, index.high] for key, index in one.share.items()},
@@ -173,6 +213,12 @@ class Tolerated(OnScreen):
                     "together": [one.together.value, one.together.low, one.together.high], "cases": one.cases,
                 }
                 for name, one in self.sensitivities.items()
+            },
+            "worst": [{"quantity": one.quantity, "value": one.value, "sampled": one.sampled, "case": one.case,
+                       "values": dict(one.values), "file": str(one.file)} for one in self.worst],
+            "total": {
+                name: {key: [index.value, index.low, index.high] for key, index in one.items()}
+                for name, one in self.total.items()
             },
             "store": None if self.folder is None else str(self.folder),
         }  # fmt: skip
@@ -189,12 +235,16 @@ class Means:
     workers: int = 0  # 0: as many as there are processors
     dask: str = ""  # address of a scheduler; empty for none
     long: bool = False  # more than an hour is allowed
+    worst: Path | None = None  # where axis files of the worst machines go; by default into the store
+    job: str = ""  # file of the job, as the user named it
+    force: bool = False  # replace files that detent did not write
     clock: Callable[[], float] = time.perf_counter
 
 
 def tolerance(  # noqa: PLR0913 - what may be asked
     file: AxisFile, *, job: Any = None, cases: int = 1000, seed: int = 1, limits: Sequence[str] = (),
-    margins: bool = False, means: Means | None = None, progress: Progress | None = None,
+    margins: bool = False, hunt: bool = False, total: int = 0, means: Means | None = None,
+    progress: Progress | None = None,
 ) -> Tolerated:  # fmt: skip
     """Make a job on many machines of an axis file; parameters as of `Axis.tolerance`."""
     means, progress = means or Means(), progress or untold
@@ -202,8 +252,11 @@ def tolerance(  # noqa: PLR0913 - what may be asked
         raise DetentError(f"cases: got {cases}; expected: a whole number from 1 to {MOST}; give one of these")
     if means.workers < 0:
         raise DetentError(f"workers: got {means.workers}; expected: 1 or more; leave it out for all processors")
+    if hunt:
+        _check_hunt(file, cases)
     job = _trial_job(file) if job is None else job
-    question = Question.of(file, job, seed=seed, margins=margins)
+    question = Question.of(file, job, seed=seed, margins=margins, hunt=hunt)
+    scheme = scheme_of(question, total) if total else None
     progress(0.0, "the machine of the file")
     known = quantities(question)
     stated = tuple(parse_limit(text, known) for text in limits)
@@ -211,7 +264,41 @@ def tolerance(  # noqa: PLR0913 - what may be asked
     asked = tuple(dict.fromkeys([*always, *stated]))
     with _held(question, means.store) as held:
         found = held.all(cases, means, progress)
-    return Tolerated(replace(question, limits=asked), Judged(found, known, asked), means.store)
+        question, judged = replace(question, limits=asked), Judged(found, known, asked)
+        sought = _worst(question, judged, means, progress)
+    indices = totals(*scheme, judged.outcomes, means.workers, means.dask) if scheme else {}
+    return Tolerated(question, judged, means.store, sought, indices)
+
+
+def _worst(question: Question, judged: Judged, means: Means, progress: Progress) -> list[Worst]:
+    """The worst machines, each in an axis file, where there is a folder for them."""
+    folder = means.worst or (means.store and means.store / WORST)
+    if folder is None:
+        return []
+    found = worst(question, [judged.cases], [one.name for one in judged.told if is_sought(one)], progress)
+    with write_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"{one.quantity.replace(' ', '_')}.toml" for one in found]
+    return [
+        replace(one, file=write_worst(question, one, file, means.job, force=means.force))
+        for one, file in zip(found, files, strict=True)
+    ]
+
+
+def _check_hunt(file: AxisFile, cases: int) -> None:
+    """Refuse to watch more machines at standstill than one waits for, or where nothing watches them."""
+    from detent.methods.registry import METHODS
+
+    if not METHODS[file.spec.axis.method].stands:
+        raise DetentError(
+            f"--hunt: got an axis of the method {file.spec.axis.method}; expected: one whose loop is watched at "
+            "standstill; leave it out"
+        )
+    if cases > MOST_WATCHED:
+        raise DetentError(
+            f"--hunt: got {cases} cases; expected: at most {MOST_WATCHED}, as each is watched at standstill from "
+            f"{STARTS} starts; ask for fewer"
+        )
 
 
 def _trial_job(file: AxisFile) -> Any:
