@@ -4,6 +4,8 @@ import json
 import math
 import random
 import re
+import subprocess
+import sys
 from functools import partial
 
 import numpy as np
@@ -11,6 +13,7 @@ import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
 from tests.identify_files import columns_of, write_log
+from tests.live_browser import run_script
 from tests.standstill_rig import RIGID, both, drawn, example, rigid, told
 from tests.store_rig import QUESTION, fill, fill_killed, run_killed
 from tests.tolerance_rig import (
@@ -861,3 +864,38 @@ def test_39_the_filtered_servo_by_processes(tmp_path):
     chunks = chunks_of(rubs, 300)
     assert len(chunks) > 2
     assert case_of(run_chunk(rubs, 171, 1), 171)[1]["error"] == results["error"][171]
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("verb", ["tune", "hunt", "tolerance"])
+def test_40_the_help_of_a_verb_loads_no_more_than_that_of_check(verb):
+    """What a verb computes with loads when it computes: in modules, of which each costs a person time."""
+    told, known = (modules_of(word, "--help") for word in (verb, "check"))
+    assert not told - known
+    assert not told & {"numba", "numpy", "scipy", "h5py", "pint", "matplotlib"}
+
+
+def modules_of(*words: str) -> set[str]:
+    """What a command loads."""
+    done = subprocess.run(
+        [sys.executable, "-X", "importtime", "-m", "detent", *words], capture_output=True, text=True, check=True
+    )
+    found = {row.rpartition("|")[2].strip() for row in done.stderr.splitlines() if row.startswith("import time:")}
+    assert "detent.cli.app" in found
+    return found
+
+
+@pytest.mark.wide
+@pytest.mark.process
+@pytest.mark.parametrize("verb", ["tune", "hunt", "tolerance"])
+def test_40_reports_open_without_a_network_and_on_a_telephone(verb, tmp_path):
+    file, report = tmp_path / "slide.toml", tmp_path / f"{verb}.html"
+    file.write_text(CASCADE.read_text(encoding="utf-8") + (SET_OF_8 if verb == "tolerance" else ""), encoding="utf-8")
+    axis = detent.load(file)
+    made = axis.tolerance(cases=200, total=64) if verb == "tolerance" else getattr(axis, verb)()
+    seen = run_script("report", str(made.report(report)))
+    assert seen["problems"] == []
+    assert seen["asked"] == ["file:"]  # the page itself
+    assert seen["charts"] >= 3
+    assert seen["wide"] == 360  # it does not scroll sideways
+    assert axis.name in seen["heading"]
