@@ -108,24 +108,11 @@ def _width(share: float, cases: int) -> float:
 
 
 class Failure(NamedTuple):
-    """A kind of failing, and the cases that fail so."""
+    """A kind of failing: how many cases fail so, and the first of them."""
 
     kind: str
-    all: tuple[int, ...]
-
-    @property
-    def number(self) -> int:
-        """How many."""
-        return len(self.all)
-
-    @property
-    def cases(self) -> tuple[int, ...]:
-        """The first of them."""
-        return self.all[:SHOWN_CASES]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return {"kind": self.kind, "number": self.number, "cases": self.cases}
+    number: int
+    cases: tuple[int, ...]
 
 
 class Figure(NamedTuple):
@@ -169,7 +156,7 @@ class Judged:
         """Columns of all cases, their units and what they are; `keys` gives the units of the keys."""
         kinds = np.zeros(self.cases.count, np.uint16)
         for k, one in enumerate(self.failures):
-            kinds[[number - self.cases.first for number in one.all]] = k + 1
+            kinds[[number - self.cases.first for number in self._kinds[one.kind]]] = k + 1
         columns: dict[str, NDArray[Any]] = {"case": self.cases.first + np.arange(self.cases.count)} | self.cases.values
         units = {**keys} | {f"results.{name.replace(' ', '_')}": unit for name, unit in self.units.items()}
         columns |= {f"results.{name.replace(' ', '_')}": each for name, each in self.cases.results.items()}
@@ -189,13 +176,18 @@ class Judged:
         return [Yield(name, int(np.count_nonzero(kept)), self.cases.count) for name, kept in every]
 
     @cached_property
-    def failures(self) -> list[Failure]:
-        """Why cases fail, the most frequent kind first."""
+    def _kinds(self) -> dict[str, list[int]]:
+        """Cases that fail, by kind."""
         kinds = dict[str, list[int]]()
         for k in np.flatnonzero(~self.good).tolist():
             lost = ", ".join(name for name, kept in self.kept.items() if not kept[k])
             kinds.setdefault(str(self.cases.reason[k]) or f"not {lost}", []).append(k + self.cases.first)
-        found = [Failure(kind, tuple(cases)) for kind, cases in kinds.items()]
+        return kinds
+
+    @cached_property
+    def failures(self) -> list[Failure]:
+        """Why cases fail, the most frequent kind first."""
+        found = [Failure(kind, len(cases), tuple(cases[:SHOWN_CASES])) for kind, cases in self._kinds.items()]
         return sorted(found, key=lambda one: (-one.number, one.kind))
 
     @cached_property

@@ -205,7 +205,7 @@ class Tolerated(OnScreen):
             "quantities": {
                 name: {"unit": self.judged.units[name], **one._asdict()} for name, one in self.figures.items()
             },
-            "failures": [one.to_dict() for one in self.judged.failures],
+            "failures": [one._asdict() for one in self.judged.failures],
             "sensitivities": {
                 name: {
                     "share": {key: [index.value, index.low, index.high] for key, index in one.share.items()},
