@@ -136,8 +136,8 @@ def spread_of(results: np.ndarray) -> tuple[float, float, float, float]:
 
 
 def gathered(chunks: Iterable[Chunk]) -> dict[str, np.ndarray]:
-    """Results of many chunks in one."""
-    each = list(chunks)
+    """Results of many chunks in one, in the order of their cases."""
+    each = sorted(chunks, key=lambda one: one.first)
     return {name: np.concatenate([one.results[name] for one in each]) for name in each[0].results}
 
 

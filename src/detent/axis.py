@@ -392,10 +392,14 @@ class Axis(OnScreen):
         seed: int = 1,
         limits: Sequence[str] = (),
         margins: bool = False,
+        hunt: bool = False,
+        total: int = 0,
         store: str | Path | None = None,
+        worst: str | Path | None = None,
         workers: int = 0,
         dask: str = "",
         yes: bool = False,
+        force: bool = False,
         progress: Progress | None = None,
     ) -> "Tolerated":
         """Make a job on many machines that differ in the keys of ``[tolerance]``, and say how many are good.
@@ -415,8 +419,16 @@ class Axis(OnScreen):
             What passes beside that the job is done: ``"peak_following <= 45 um"``. Default: what the file says.
         margins : bool
             Margins of the loops are quantities, too.
+        hunt : bool
+            And what each of at most 1000 machines does at standstill from eight starts: the share of them that hunt,
+            and the largest swing.
+        total : int
+            Points of a scheme of runs of its own, a power of 2, that gives the total index of each key; it makes that
+            many times the number of keys and two runs.
         store : path, optional
             Folder that keeps each chunk of cases; one of the same question is continued.
+        worst : path, optional
+            Folder for an axis file of the worst machine found of each quantity. Default: ``worst`` in the store.
         workers : int
             Threads, or processes where the method runs each machine for itself; 0 for all processors. A script whose
             processes these are has its work under ``if __name__ == "__main__":``.
@@ -424,6 +436,8 @@ class Axis(OnScreen):
             Address of a Dask scheduler, or "local:2", which computes instead.
         yes : bool
             More than an hour is allowed.
+        force : bool
+            Replace axis files in the folder of the worst that detent did not write.
         progress : callable, optional
             ``progress(share, text)``.
 
@@ -442,10 +456,14 @@ class Axis(OnScreen):
         from detent.tune.tolerated import Means, tolerance
 
         tried = None if job is None else self._job(job)
-        means = Means(store=None if store is None else Path(store), workers=workers, dask=dask, long=yes)
+        means = Means(
+            store=None if store is None else Path(store), workers=workers, dask=dask, long=yes, force=force,
+            worst=None if worst is None else Path(worst), job=str(job) if isinstance(job, str | Path) else "",
+        )  # fmt: skip
         return tolerance(
-            self.file, job=tried, cases=cases, seed=seed, limits=limits, margins=margins, means=means, progress=progress
-        )
+            self.file, job=tried, cases=cases, seed=seed, limits=limits, margins=margins, hunt=hunt, total=total,
+            means=means, progress=progress,
+        )  # fmt: skip
 
     def envelopes(self) -> Mapping[str, Any]:
         """Table of permissible frequencies, an `Envelope`, of each motor by name, between its extremes at power-on.

@@ -4,6 +4,8 @@ import json
 import math
 import random
 import re
+import subprocess
+import sys
 from functools import partial
 
 import numpy as np
@@ -11,6 +13,7 @@ import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
 from tests.identify_files import columns_of, write_log
+from tests.live_browser import run_script
 from tests.standstill_rig import RIGID, both, drawn, example, rigid, told
 from tests.store_rig import QUESTION, fill, fill_killed, run_killed
 from tests.tolerance_rig import (
@@ -711,7 +714,7 @@ def test_36_workers_of_dask_give_the_same_bytes_though_one_is_killed(tmp_path, m
     here = run_chunk(question, 0, 100)
     killed = partial(run_killed, at=40, once=str(tmp_path / "once"))
     for run in (run_chunk, killed):
-        found = dict(workers.on_dask(run, question, spans, "local:2"))
+        found = dict(workers.computed(workers.dask("local:2"), run, question, spans))
         there = store.joined([found[span] for span in spans], 100)
         for kind in ("values", "results"):
             for name, values in getattr(here, kind).items():
@@ -720,7 +723,7 @@ def test_36_workers_of_dask_give_the_same_bytes_though_one_is_killed(tmp_path, m
     assert (tmp_path / "once").exists()
     monkeypatch.setattr(workers, "source_hash", lambda: "0123")
     with pytest.raises(DetentError, match=r"the worker tcp://.* has source hash .*; expected: 0123"):
-        list(workers.on_dask(run_chunk, question, spans, "local:1"))
+        list(run_chunks(question, spans, dask="local:1"))
 
 
 @pytest.mark.compiled
@@ -817,7 +820,7 @@ def test_34_a_case_is_the_same_in_any_chunk(tmp_path):
     alone = case_of(run_chunk(question, 4711, 1), 4711)
     assert case_of(run_chunk(question, 4700, 40), 4711) == alone
     for threads in (1, 2):
-        chunks = list(run_chunks(question, [(4690, 10), (4700, 17)], threads))
+        chunks = sorted(run_chunks(question, [(4690, 10), (4700, 17)], threads), key=lambda one: one.first)
         assert [one.first for one in chunks] == [4690, 4700]
         assert case_of(chunks[1], 4711) == alone
     more = run_chunk(asked(tmp_path, SLIDE + '"method.timeout" = "10 %"\n'), 4711, 1)
@@ -957,3 +960,36 @@ def test_39_filtered_servos_fail_where_their_loop_is_unstable_and_friction_does_
     assert beyond.mean() == pytest.approx(unstable, abs=0.03)
     assert fails[beyond].mean() > 0.8
     assert fails[~beyond].mean() < 0.05
+@pytest.mark.process
+@pytest.mark.parametrize("verb", ["tune", "hunt", "tolerance"])
+def test_40_the_help_of_a_verb_loads_no_more_than_that_of_check(verb):
+    """What a verb computes with loads when it computes: in modules, of which each costs a person time."""
+    told, known = (modules_of(word, "--help") for word in (verb, "check"))
+    assert not told - known
+    assert not told & {"numba", "numpy", "scipy", "h5py", "pint", "matplotlib"}
+
+
+def modules_of(*words: str) -> set[str]:
+    """What a command loads."""
+    done = subprocess.run(
+        [sys.executable, "-X", "importtime", "-m", "detent", *words], capture_output=True, text=True, check=True
+    )
+    found = {row.rpartition("|")[2].strip() for row in done.stderr.splitlines() if row.startswith("import time:")}
+    assert "detent.cli.app" in found
+    return found
+
+
+@pytest.mark.wide
+@pytest.mark.process
+@pytest.mark.parametrize("verb", ["tune", "hunt", "tolerance"])
+def test_40_reports_open_without_a_network_and_on_a_telephone(verb, tmp_path):
+    file, report = tmp_path / "slide.toml", tmp_path / f"{verb}.html"
+    file.write_text(CASCADE.read_text(encoding="utf-8") + (SET_OF_8 if verb == "tolerance" else ""), encoding="utf-8")
+    axis = detent.load(file)
+    made = axis.tolerance(cases=200, total=64) if verb == "tolerance" else getattr(axis, verb)()
+    seen = run_script("report", str(made.report(report)))
+    assert seen["problems"] == []
+    assert seen["asked"] == ["file:"]  # the page itself
+    assert seen["charts"] >= 3
+    assert seen["wide"] == 360  # it does not scroll sideways
+    assert axis.name in seen["heading"]

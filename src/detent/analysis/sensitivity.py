@@ -97,9 +97,9 @@ def sensitivity(inputs: Mapping[str, Values], outcome: Values) -> Sensitivity | 
     ranks = {key: _resampled_ranks(np.asarray(x)[kept], y, group, taken) for key, x in inputs.items()}
     rest = 1.0 - np.sum(list(shares.values()), axis=0) if shares else np.ones(RESAMPLES + 1)
     return Sensitivity(
-        {key: _index(found, 0.0, 1.0) for key, found in shares.items()},
-        {key: _index(found, -1.0, 1.0) for key, found in ranks.items()},
-        _index(rest, 0.0, 1.0),
+        {key: interval_of(found, 0.0, 1.0) for key, found in shares.items()},
+        {key: interval_of(found, -1.0, 1.0) for key, found in ranks.items()},
+        interval_of(rest, 0.0, 1.0),
         len(y),
     )
 
@@ -115,8 +115,8 @@ def ranks_of(values: Values) -> Values:
     return (last - 0.5 * (times + 1))[back]
 
 
-def _index(found: Values, least: float, most: float) -> Index:
-    """The figure of the sample, first, with the spread of the resamples."""
+def interval_of(found: Values, least: float, most: float) -> Index:
+    """The figure of a sample, the first of all, and its 95 % interval from the spread of the others, its resamples."""
     value, half = float(found[0]), TWO_SIDED * float(found[1:].std())
     return Index(*(min(max(one, least), most) for one in (value, value - half, value + half)))
 

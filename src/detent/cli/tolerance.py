@@ -16,6 +16,13 @@ LIMIT = (
 )
 MARGINS = "Measure the margins of the loops, too."
 STORE = "Folder that keeps each chunk of cases: broken off or with more --cases, the same question is continued there."
+HUNT = "Watch each machine at standstill, too, from eight starts; of at most 1000 cases."
+TOTAL = (
+    "Total index of each key from a scheme of its own: N points, a power of 2, make N times the number of keys and two "
+    "runs."
+)
+WORST = "Folder for axis files of the worst machine found of each quantity. Default: worst in the folder of --store."
+SAVE = "Write a row for each case: HDF5, CSV or Parquet, by the suffix."
 WORKERS = "Threads, or processes where the method runs each machine for itself. Default: all processors."
 DASK = "Let the workers of a Dask scheduler compute, as in tcp://host:8786, or local:2 for two of its own."
 YES = "Compute even where that takes more than an hour."
@@ -33,9 +40,13 @@ def tolerance(
     store: Annotated[Path | None, option("--store", "DIR", STORE)] = None,
     workers: Annotated[int, option("--workers", "N", WORKERS, show_default=False)] = 0,
     dask: Annotated[str, option("--dask", "ADDRESS", DASK)] = "",
+    worst: Annotated[Path | None, option("--worst", "DIR", WORST)] = None,
+    total: Annotated[int, option("--total", "N", TOTAL, show_default=False)] = 0,
+    save: Annotated[Path | None, option("--save", "FILE", SAVE)] = None,
     report: Annotated[Path | None, option("--report", "FILE", REPORT)] = None,
     *,
     margins: Annotated[bool, option("--margins", "", MARGINS)] = False,
+    hunt: Annotated[bool, option("--hunt", "", HUNT)] = False,
     yes: Annotated[bool, option("--yes", "", YES)] = False,
     force: Force = False,
     as_json: Json = False,
@@ -50,16 +61,19 @@ def tolerance(
     axis = load(file, overrides or [])
     if report is not None:
         check_target(report, (".html",), "a report", force=force)
+    if save is not None:
+        check_target(save, (".h5", ".hdf5", ".csv", ".parquet"), "cases", force=force)
     with progress_bar(quiet=as_json) as progress:
         found = axis.tolerance(
-            job, cases=cases, seed=seed, limits=limits or (), margins=margins, store=store, workers=workers, dask=dask,
-            yes=yes, progress=progress,
+            job, cases=cases, seed=seed, limits=limits or (), margins=margins, hunt=hunt, total=total, store=store,
+            worst=worst, workers=workers, dask=dask, yes=yes, force=force, progress=progress,
         )  # fmt: skip
         progress(0.99, "what makes them differ")
-        told, written = found.to_dict(), list[Path]()
+        told, written = found.to_dict(), [one.file for one in found.worst if one.file]
         places = [place for place in (report, store and store / "report.html") if place is not None]
-        for place in places:
-            written.append(found.report(place, force=force))
+        written += [found.report(place, force=force) for place in places]
+        if save is not None:
+            written.append(found.save(save, force=force))
     if as_json:
         print_json(told | {"files": [str(path) for path in written]})
     else:

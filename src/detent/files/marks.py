@@ -24,8 +24,8 @@ _HEAD, _FOOT = 1 << 16, 1 << 24  # most bytes looked at from the begin of a file
 IN_TOML, IN_C = "# {}", "/* {} */"  # how a line is said that is no part of a text
 _SIGNED = re.compile(r"(?:# |/\* )detent \S+ wrote this, checksum ([0-9A-F]{8}); edited, it is yours\.(?: \*/)?\r?\n")
 _ORDER = "\ufeff"  # byte order mark
-# Columns of a trace, and of the tables of an envelope; all others have the dotted name of a register.
-_BEGINS = ["t [s]"], ["step", "position [m]"]
+# Columns of a trace, of the tables of an envelope, and of the cases of a tolerance run; all others have a dotted name.
+_BEGINS = ["t [s]"], ["step", "position [m]"], ["case"]
 _REGISTER = re.compile(r"tick \[tick\]|\w+(?:\.\w+)+(?: \[[^\[\]]*\])?")
 
 

@@ -195,22 +195,22 @@ def unknown_column(name: str, known: Sequence[str]) -> DetentError:
     return DetentError(f"trace: no signal {name!r}{hint}; it holds: {', '.join(known) or 'none'}")
 
 
-def check_columns(columns: Mapping[str, Column]) -> None:
-    """Refuse columns that do not make a trace."""
-    if next(iter(columns), None) != TIME:
+def check_columns(columns: Mapping[str, Column], index: str = TIME) -> None:
+    """Refuse columns that do not make a trace, or a table whose first column is another `index`."""
+    if next(iter(columns), None) != index:
         first = next(iter(columns), "nothing")
         raise DetentError(f"trace: the first column must be 't' (time in s), got {first!r}; put the time first")
-    rows = columns[TIME].shape
+    rows = columns[index].shape
     for name, values in columns.items():
         if values.ndim != 1 or values.shape != rows:
             raise DetentError(
-                f"trace: column {name!r} has shape {values.shape}, 't' has {rows}; give one value per row"
+                f"trace: column {name!r} has shape {values.shape}, {index!r} has {rows}; give one value per row"
             )
         if values.dtype.kind not in "biuf":
             raise DetentError(
                 f"trace: column {name!r} holds {values.dtype}; expected: integers, floats, booleans; convert it"
             )
-    time = columns[TIME]
+    time = columns[index]
     backwards = np.flatnonzero(~(np.diff(time) >= 0)) if time.size > 1 else np.empty(0, dtype=np.intp)
     if backwards.size:
         row = int(backwards[0])

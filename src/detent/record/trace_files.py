@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from detent.errors import DetentError, InputError
 from detent.files.apart import read_apart
 from detent.files.text import check_file, write_errors, writing
-from detent.record.trace import BROKEN_OFF, TIME, Attribute, Column, Trace, broke_off, check_columns
+from detent.record.trace import BROKEN_OFF, Attribute, Column, Trace, broke_off, check_columns
 
 CHUNK_ROWS = 16384  # rows of one HDF5 chunk: 128 KiB of float64, inside h5py's chunk cache of 1 MiB per column
 CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
@@ -110,6 +110,15 @@ class _Disk(io.RawIOBase):
         super().close()
 
 
+class Table(NamedTuple):
+    """A trace, in memory or in an open HDF5 file, or rows of another kind, whose first column does not fall either."""
+
+    columns: Mapping[str, Column]
+    units: Mapping[str, str]
+    docs: Mapping[str, str]
+    attributes: Mapping[str, Attribute]
+
+
 class TraceWriter:
     """Write a trace to HDF5 piece by piece, in constant memory, for runs of any length.
 
@@ -126,7 +135,7 @@ class TraceWriter:
     2
     """
 
-    def __init__(self, path: str | Path, head: Trace, *, force: bool = False) -> None:
+    def __init__(self, path: str | Path, head: Trace | Table, *, force: bool = False) -> None:
         self.path = Path(path)
         self.rows = 0
         self._last_time = -np.inf
@@ -138,7 +147,7 @@ class TraceWriter:
             self._sets = self._write_head(head)
             self._naming = stack.pop_all()
 
-    def _write_head(self, head: Trace) -> dict[str, Any]:
+    def _write_head(self, head: Trace | Table) -> dict[str, Any]:
         from detent import __version__
 
         root = self._file.attrs
@@ -148,13 +157,13 @@ class TraceWriter:
         root["format"] = FORMAT
         root["complete"] = 0
         group = self._file.create_group(GROUP)
-        group.attrs["columns"] = list(head)  # HDF5 itself lists datasets by name, not in order
+        group.attrs["columns"] = list(head.columns)  # HDF5 itself lists datasets by name, not in order
         kept: dict[str, Any] = {"maxshape": (None,), "chunks": (CHUNK_ROWS,), "shuffle": True}
         for name, column in head.columns.items():
             dataset = group.create_dataset(name, (0,), column.dtype, compression="gzip", compression_opts=1, **kept)
             dataset.attrs["unit"] = head.units.get(name, "")
             dataset.attrs["doc"] = head.docs.get(name, "")
-        return {name: group[name] for name in head}
+        return {name: group[name] for name in head.columns}
 
     def append(self, rows: NDArray[np.void] | Mapping[str, Column]) -> None:
         """Add rows, given as such or as columns."""
@@ -163,8 +172,9 @@ class TraceWriter:
             raise DetentError(f"{self.path}: the trace is closed; append rows before close()")
         if list(columns) != list(self._sets):
             raise DetentError(f"{self.path}: got columns {list(columns)}, the file has {list(self._sets)}; send these")
-        check_columns(columns)
-        time = columns[TIME]
+        first = next(iter(columns))
+        check_columns(columns, first)
+        time = columns[first]
         if not time.size:
             return
         if time[0] < self._last_time:
@@ -207,17 +217,21 @@ class TraceWriter:
 SAMPLES, SAMPLE_ROWS = 5, 100  # stretches of a trace, and rows of each, that tell how long its rows are as text
 
 
-class _Table(NamedTuple):
-    """A trace in memory, or in an open HDF5 file: what it is written again from."""
-
-    columns: Mapping[str, Column]
-    units: Mapping[str, str]
-    docs: Mapping[str, str]
-    attributes: Mapping[str, Attribute]
+def save_table(table: Table, path: str | Path, *, force: bool = False) -> None:
+    """Write columns in the format its suffix names; in place of a file that detent did not write by `force` only."""
+    suffix = Path(path).suffix.lower()
+    if suffix in STORES:
+        with TraceWriter(path, table, force=force) as writer:
+            writer.append(table.columns)
+    elif suffix in _WRITERS:
+        _WRITERS[suffix](table, Path(path), force=force)
+    else:
+        allowed = ", ".join([*STORES, *_WRITERS])
+        raise DetentError(f"{path}: a trace cannot be saved as {suffix!r}; use one of {allowed}")
 
 
 @contextmanager
-def _open_store(path: Path) -> Generator[_Table]:
+def _open_store(path: Path) -> Generator[Table]:
     """The trace in an HDF5 file; the file's format is its own affair."""
     try:
         file: Any = _h5py().File(path, "r")
@@ -232,7 +246,7 @@ def _open_store(path: Path) -> Generator[_Table]:
         columns = {str(name): file[GROUP][name] for name in file[GROUP].attrs["columns"]}
         units, docs = ({name: str(one.attrs[key]) for name, one in columns.items()} for key in ("unit", "doc"))
         told = {name: value for name, value in file.attrs.items() if name != "format"}
-        yield _Table(columns, units, docs, {name: _plain(value) for name, value in told.items()})
+        yield Table(columns, units, docs, {name: _plain(value) for name, value in told.items()})
 
 
 def read_note(path: Path, name: str) -> str:
@@ -280,7 +294,7 @@ def _texts(values: Column) -> list[str]:
     return list(map(repr, values.tolist()))
 
 
-def _write_parquet(table: _Table, path: Path, *, force: bool) -> None:
+def _write_parquet(table: Table, path: Path, *, force: bool) -> None:
     """Write columns as Parquet, group by group; units and descriptions are their metadata, attributes the schema's."""
     arrow, parquet = need_parquet()
     kinds = {name: arrow.from_numpy_dtype(values.dtype) for name, values in table.columns.items()}
@@ -288,12 +302,12 @@ def _write_parquet(table: _Table, path: Path, *, force: bool) -> None:
     fields = [arrow.field(name, kind, metadata=told[name]) for name, kind in kinds.items()]
     schema = arrow.schema(fields, metadata={"detent": json.dumps({"format": FORMAT, **table.attributes})})
     with writing(path, force=force) as part, parquet.ParquetWriter(part, schema) as writer:
-        for first in range(0, len(table.columns[TIME]), PARQUET_ROWS):
+        for first in range(0, len(next(iter(table.columns.values()))), PARQUET_ROWS):
             block = [arrow.array(values[first : first + PARQUET_ROWS]) for values in table.columns.values()]
             writer.write_table(arrow.table(block, schema=schema))
 
 
-def _write_table_csv(table: _Table, path: Path, *, force: bool) -> None:
+def _write_table_csv(table: Table, path: Path, *, force: bool) -> None:
     """A header row such as ``t [s],motor.current [A]``; descriptions and attributes are not in the file.
 
     Nor can it say that the run broke off: such a trace would pass for a whole one.
@@ -332,15 +346,7 @@ def size_as_csv(store: str | Path) -> int:
 
 def save_trace(trace: Trace, path: str | Path, *, force: bool = False) -> None:
     """Write a trace in the format its suffix names; in place of a file that detent did not write by `force` only."""
-    suffix = Path(path).suffix.lower()
-    if suffix in STORES:
-        with TraceWriter(path, trace, force=force) as writer:
-            writer.append(trace.columns)
-    elif suffix in _WRITERS:
-        _WRITERS[suffix](_Table(trace.columns, trace.units, trace.docs, trace.attributes), Path(path), force=force)
-    else:
-        allowed = ", ".join([*STORES, *_WRITERS])
-        raise DetentError(f"{path}: a trace cannot be saved as {suffix!r}; use one of {allowed}")
+    save_table(Table(trace.columns, trace.units, trace.docs, trace.attributes), path, force=force)
 
 
 def load_trace(path: str | Path) -> Trace:

@@ -6,12 +6,11 @@ Nothing here is a closure: chunks may be made in threads, in processes of this m
 
 import math
 import os
-from collections import deque
+import re
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -19,15 +18,20 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError, InputError
 from detent.methods.batch import kind_of, refusal_of
+from detent.tune import workers as crew
 from detent.tune.cases import Limit, Numbers, Question, draw
 
 __all__ = [
-    "Chunk", "Limit", "Quantity", "Question", "chunks_of", "default_limits", "draw", "quantities", "run_chunk",
-    "run_chunks",
+    "Chunk", "Limit", "Quantity", "Question", "chunk_size", "chunks_of", "default_limits", "draw", "quantities",
+    "run_chunk", "run_chunks",
 ]  # fmt: skip
 
 CHUNK, CHUNK_ALONE = 1000, 50  # cases of a chunk: of a method that makes many at once, of one that makes each alone
+CHUNK_WATCHED = 5  # and where each is watched at standstill, too
+STARTS = 8  # of each at standstill
 DONE = "done"  # the quantity that every case has: 1 or 0
+HUNTS = "hunts at rest"  # share of the starts of a machine that hunt
+SWING = "swing at rest"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,14 @@ class Quantity:
     name: str
     unit: str  # SI; empty for a pure number
     nominal: float  # of case 0
+
+
+_OF_A_MOVE = re.compile(r"move \d+ ")
+
+
+def is_of_a_move(one: Quantity) -> bool:
+    """True of what one move of several does."""
+    return _OF_A_MOVE.match(one.name) is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,23 +80,23 @@ def quantities(question: Question) -> tuple[Quantity, ...]:
     told: Any = getattr(spec, "unit", str)
     figures = {name: value for name, value in result.figures().items() if not (result.done and math.isnan(value))}
     found = [Quantity(name, told(units.get(name.split(" ")[-1], "")), value) for name, value in figures.items()]
-    if question.margins:
-        found += [Quantity(name, _margin_unit(name), value) for name, value in _margins(question, spec).items()]
-    return tuple(found)
+    return (*found, *(Quantity(name, unit, value) for name, (value, unit) in _looked_at(question, spec).items()))
 
 
-def _margins(question: Question, spec: Any) -> dict[str, float]:
-    """Margins of the loops of an axis, where each is cut."""
-    found = dict[str, float]()
-    for cut, one in question.method.linear(spec).margins.items():
-        found |= {
-            f"Ms at {cut}": one.sensitivity, f"phase margin at {cut}": one.phase, f"gain margin at {cut}": one.gain,
-        }  # fmt: skip
+def _looked_at(question: Question, spec: Any) -> dict[str, tuple[float, str]]:
+    """What an axis is beside its job, where that is asked: margins of its loops where each is cut, and hunting."""
+    found = dict[str, tuple[float, str]]()
+    for cut, one in question.method.linear(spec).margins.items() if question.margins else ():
+        found[f"Ms at {cut}"] = one.sensitivity, ""
+        found[f"phase margin at {cut}"] = one.phase, "rad"
+        found[f"gain margin at {cut}"] = one.gain, ""
+    if question.hunt:
+        from detent.tune.standstill import HUNTS as HUNTING
+        from detent.tune.standstill import standstill
+
+        stood = standstill(spec, STARTS, question.seed)
+        found |= {HUNTS: (stood.shares[HUNTING], ""), SWING: (stood.swing, stood.ensemble.unit)}
     return found
-
-
-def _margin_unit(name: str) -> str:
-    return "rad" if name.startswith("phase") else ""
 
 
 def default_limits(question: Question) -> tuple[Limit, ...]:
@@ -92,7 +104,8 @@ def default_limits(question: Question) -> tuple[Limit, ...]:
     from detent.axisfile.tolerance import value_of
 
     kept = {name: value_of(question.file.spec, key) for name, key in _nominal(question).kept_by.items()}
-    return (Limit(DONE, 1.0, least=True), *(Limit(name, value) for name, value in kept.items()))
+    rests = (Limit(HUNTS, 0.0),) if question.hunt else ()
+    return (Limit(DONE, 1.0, least=True), *(Limit(name, value) for name, value in kept.items()), *rests)
 
 
 def run_case(question: Question, values: Mapping[str, float]) -> tuple[dict[str, float], str]:
@@ -115,8 +128,8 @@ def run_chunk(question: Question, first: int, count: int) -> Chunk:
     values = draw(question, first, count)
     names = [one.name for one in quantities(question)]
     found, reasons = make_cases(question, values, count)
-    if question.margins:
-        found |= _all_margins(question, values, reasons, count)
+    if question.margins or question.hunt:
+        found |= _looked_at_all(question, values, reasons, count)
     empty = np.full(count, np.nan)
     return Chunk(
         first, values, {name: found.get(name, empty) for name in names},
@@ -124,15 +137,15 @@ def run_chunk(question: Question, first: int, count: int) -> Chunk:
     )  # fmt: skip
 
 
-def _all_margins(
+def _looked_at_all(
     question: Question, values: Mapping[str, Numbers], reasons: Mapping[int, str], count: int
 ) -> dict[str, Numbers]:
-    """Margins of the loops of each machine that did the job."""
+    """What each machine that did the job is beside it."""
     found = dict[str, Numbers]()
     for k in range(count):
         if k not in reasons:
             spec = question.machine({key: float(each[k]) for key, each in values.items()}).spec
-            for name, value in _margins(question, spec).items():
+            for name, (value, _) in _looked_at(question, spec).items():
                 found.setdefault(name, np.full(count, np.nan))[k] = value
     return found
 
@@ -161,32 +174,29 @@ def make_cases(
 # ---- many chunks
 
 
-def chunks_of(question: Question, count: int, size: int = 0) -> list[tuple[int, int]]:
+def chunk_size(question: Question) -> int:
+    """Cases of a chunk: a second's work or so."""
+    return CHUNK_WATCHED if question.hunt else CHUNK if question.method.batches else CHUNK_ALONE
+
+
+def chunks_of(question: Question, count: int, size: int = 0) -> list[crew.Span]:
     """First case and number of cases of each chunk of so many cases."""
-    is_batch = question.method.batch(question.file.spec, question.job) is not None
-    size = size or (CHUNK if is_batch else CHUNK_ALONE)
+    size = size or chunk_size(question)
     return [(first, min(size, count - first)) for first in range(0, count, size)]
 
 
-def run_chunks(question: Question, chunks: Iterable[tuple[int, int]], workers: int = 0) -> Iterator[Chunk]:
-    """Make some chunks, given by first case and number of cases, side by side, and give them in their order.
+def run_chunks(question: Question, chunks: Iterable[crew.Span], workers: int = 0, dask: str = "") -> Iterator[Chunk]:
+    """Make some chunks, given by first case and number of cases, side by side, and give them as they are done.
 
-    Workers are threads of this process where a chunk is one compiled loop, else processes; 0: one for each core. At
-    most twice as many chunks as workers are under way.
+    Workers are threads of this process where a chunk is one compiled loop, else processes; 0: one for each processor.
+    With an address of a Dask scheduler its workers make them.
     """
-    workers = workers or os.cpu_count() or 1
-    is_batch = question.method.batch(question.file.spec, question.job) is not None
+    spans = list(chunks)
+    if not spans:
+        return
     quantities(question)  # every thread finds it done, and what is compiled
-    pool = ThreadPoolExecutor(workers) if is_batch else ProcessPoolExecutor(workers, get_context("spawn"))
-    waiting, left = deque[Future[Chunk]](), iter(chunks)
-    with pool:
-        try:
-            for first, count in left:
-                waiting.append(pool.submit(run_chunk, question, first, count))
-                if len(waiting) >= 2 * workers:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:
-            for one in waiting:
-                one.cancel()
+    number = min(workers or os.cpu_count() or 1, len(spans))
+    hands = crew.threads if question.method.batches or number == 1 else crew.processes
+    with closing(crew.computed(crew.dask(dask) if dask else hands(number), run_chunk, question, spans)) as found:
+        for _, chunk in found:
+            yield chunk

@@ -11,7 +11,8 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, is_dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
+from importlib import import_module
 from typing import Any, cast
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from detent import __version__
 from detent.axisfile.elementwise import is_array, nearest
-from detent.axisfile.tolerance import TABLE, Tolerance, joint, value_of
+from detent.axisfile.tolerance import EDGE, TABLE, Tolerance, joint, value_of
 from detent.errors import DetentError
 from detent.files.source import parse_source
 from detent.kernel.cache import source_hash
@@ -64,11 +65,14 @@ class Question:
     seed: int = 1  # 0 to 2**64 - 1
     limits: tuple[Limit, ...] = ()  # what passes
     margins: bool = False  # margins of the loops are quantities, too
+    hunt: bool = False  # and what each machine does at standstill
+    scheme: int = 0  # points of the scheme of `total`, whose machines these are; 0: they are drawn at random
 
     @classmethod
-    def of(
-        cls, file: AxisFile, job: Any, *, seed: int = 1, limits: Iterable[Limit] = (), margins: bool = False
-    ) -> "Question":
+    def of(  # noqa: PLR0913 - what may be asked
+        cls, file: AxisFile, job: Any, *, seed: int = 1, limits: Iterable[Limit] = (), margins: bool = False,
+        hunt: bool = False,
+    ) -> "Question":  # fmt: skip
         """What is asked of an axis file; refused where nothing of it is toleranced."""
         if not 0 <= seed <= MOST_SEED:
             raise DetentError(f"seed: got {seed}; expected: a whole number from 0 to {MOST_SEED}; give one of these")
@@ -84,7 +88,7 @@ class Question:
             )
         text, changes = file.source.content.decode("utf-8"), tuple(_leaves(file.changes))
         tolerance = tuple(file.tolerance.values())
-        return cls(file.file, text, file.overrides, changes, job, tolerance, seed, tuple(limits), margins)
+        return cls(file.file, text, file.overrides, changes, job, tolerance, seed, tuple(limits), margins, hunt)
 
     @cached_property
     def file(self) -> AxisFile:
@@ -105,7 +109,8 @@ class Question:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data: all that the results depend on, and what computes them."""
-        told = {name: getattr(self, name) for name in ("text", "overrides", "changes", "seed", "margins")}
+        plain = ("text", "overrides", "changes", "seed", "margins", "hunt", "scheme")
+        told = {name: getattr(self, name) for name in plain}
         told |= {name: [asdict(one) for one in getattr(self, name)] for name in ("tolerance", "limits")}
         job = asdict(self.job) if is_dataclass(self.job) and not isinstance(self.job, type) else repr(self.job)
         return told | {"job": job, "version": __version__, "steps": source_hash()}
@@ -178,9 +183,39 @@ def draw(question: Question, first: int, count: int) -> dict[str, Numbers]:
     Of the question seed and tolerances matter, nothing else.
     """
     found, own = dict[str, Numbers](), {one.key: one for one in question.tolerance}
-    places = joint(own, {key: shares(question.seed, key, first, count) for key in own})
+    if question.scheme:
+        places = exchanged(tuple(own), question.scheme, question.seed, first, count)
+    else:
+        places = joint(own, {key: shares(question.seed, key, first, count) for key in own})
     for one in question.tolerance:
         found[one.key] = _at(one, places[one.key])
-        if first == 0 and count:
+        if first == 0 and count and not question.scheme:
             found[one.key][0] = question.nominal[one.key]
     return found
+
+
+# ---- the scheme of Saltelli
+
+
+@lru_cache(maxsize=2)
+def _both(keys: int, points: int, seed: int) -> Numbers:
+    """Shares of all keys in two samples, above 0 and below 1, shape (points, 2 keys).
+
+    Both come from one sequence of Sobol: two scrambles of the same one are no two samples, and give indices that add
+    up to too much.
+    """
+    qmc: Any = import_module("scipy.stats.qmc")
+    return np.clip(qmc.Sobol(2 * keys, seed=seed).random(points), EDGE, 1.0 - EDGE)
+
+
+def exchanged(keys: tuple[str, ...], points: int, seed: int, first: int, count: int) -> dict[str, Numbers]:
+    """Shares of each key in some cases of the scheme: two samples, then the first with one column of the second.
+
+    Saltelli et al.: Variance based sensitivity analysis of model output, Comput. Phys. Comm. 181 (2010).
+    """
+    both, row = _both(len(keys), points, seed), np.arange(first, first + count)
+    block, point = row // points, row % points
+    return {
+        key: np.where((block == 1) | (block == 2 + j), both[point, len(keys) + j], both[point, j])
+        for j, key in enumerate(keys)
+    }

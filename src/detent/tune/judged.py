@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from detent.analysis.sensitivity import clopper_pearson
 from detent.errors import DetentError
 from detent.files.text import did_you_mean
-from detent.tune.batch import DONE, Chunk, Limit, Quantity
+from detent.tune.batch import DONE, Chunk, Limit, Quantity, is_of_a_move
 from detent.units import QuantityError, describe_kind, format_quantity, parse_quantity
 
 ALL = "all limits"
+PASSED = "passed"  # the quantity that is 1 where all limits are kept
 SHOWN_CASES = 3  # of each kind of failure
 MOST_CASES = 10**9  # that are asked for to halve an interval
 _LIMIT = re.compile(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*")
-_OF_A_MOVE = re.compile(r"move \d+ ")
 
 
 def parse_limit(text: str, known: Sequence[Quantity]) -> Limit:
@@ -57,11 +57,6 @@ def parse_limit(text: str, known: Sequence[Quantity]) -> Limit:
 def _plain(name: str) -> str:
     """A name however its words are put together."""
     return " ".join(name.lower().replace("_", " ").split())
-
-
-def is_of_a_move(one: Quantity) -> bool:
-    """True of what one move of several does."""
-    return _OF_A_MOVE.match(one.name) is not None
 
 
 def limit_text(limit: Limit, units: Mapping[str, str]) -> str:
@@ -150,6 +145,25 @@ class Judged:
         """Which cases keep each limit, by its text."""
         return {limit_text(one, self.units): one.kept(self.cases.results) for one in self.limits}
 
+    def outcomes(self, cases: Chunk) -> dict[str, NDArray[np.float64]]:
+        """What may depend on the keys, of these or of other cases: quantities that are told, and whether they pass."""
+        found = {one.name: cases.results[one.name] for one in self.told if one.name != DONE}
+        kept = [one.kept(cases.results) for one in self.limits]
+        passed = np.logical_and.reduce([np.ones(cases.count, np.bool_), *kept])
+        return found | {PASSED: passed.astype(np.float64)}
+
+    def table(self, keys: Mapping[str, str]) -> tuple[dict[str, NDArray[Any]], dict[str, str], dict[str, str]]:
+        """Columns of all cases, their units and what they are; `keys` gives the units of the keys."""
+        kinds = np.zeros(self.cases.count, np.uint16)
+        for k, one in enumerate(self.failures):
+            kinds[[number - self.cases.first for number in self._kinds[one.kind]]] = k + 1
+        columns: dict[str, NDArray[Any]] = {"case": self.cases.first + np.arange(self.cases.count)} | self.cases.values
+        units = {**keys} | {f"results.{name.replace(' ', '_')}": unit for name, unit in self.units.items()}
+        columns |= {f"results.{name.replace(' ', '_')}": each for name, each in self.cases.results.items()}
+        columns |= {"results.passed": self.good, "results.failure": kinds}
+        told = "; ".join(f"{k}: {one.kind}" for k, one in enumerate(self.failures, 1))
+        return columns, units, {"results.failure": f"0: passes; {told}" if told else "0: passes"}
+
     @cached_property
     def good(self) -> NDArray[np.bool_]:
         """Which cases keep all of them."""
@@ -162,13 +176,18 @@ class Judged:
         return [Yield(name, int(np.count_nonzero(kept)), self.cases.count) for name, kept in every]
 
     @cached_property
-    def failures(self) -> list[Failure]:
-        """Why cases fail, the most frequent kind first."""
+    def _kinds(self) -> dict[str, list[int]]:
+        """Cases that fail, by kind."""
         kinds = dict[str, list[int]]()
         for k in np.flatnonzero(~self.good).tolist():
             lost = ", ".join(name for name, kept in self.kept.items() if not kept[k])
             kinds.setdefault(str(self.cases.reason[k]) or f"not {lost}", []).append(k + self.cases.first)
-        found = [Failure(kind, len(cases), tuple(cases[:SHOWN_CASES])) for kind, cases in kinds.items()]
+        return kinds
+
+    @cached_property
+    def failures(self) -> list[Failure]:
+        """Why cases fail, the most frequent kind first."""
+        found = [Failure(kind, len(cases), tuple(cases[:SHOWN_CASES])) for kind, cases in self._kinds.items()]
         return sorted(found, key=lambda one: (-one.number, one.kind))
 
     @cached_property

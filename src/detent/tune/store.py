@@ -19,9 +19,8 @@ import numpy as np
 
 from detent.errors import InputError
 from detent.files.text import alone_in, sync_folder, write_errors, write_text, writing
-from detent.tune.batch import Chunk
+from detent.tune.batch import CHUNK, Chunk
 
-SIZE = 1000  # cases of a chunk
 QUESTION = "question.json"
 _ALLOWED, _REMEDY = "a folder of this question, or an empty one", "choose another folder, or ask what it was made for"
 
@@ -59,7 +58,7 @@ class Store:
 
 
 @contextmanager
-def opened(folder: Path, question: Mapping[str, Any], size: int = SIZE) -> Generator[Store]:
+def opened(folder: Path, question: Mapping[str, Any], size: int = CHUNK) -> Generator[Store]:
     """Have the store of a question for this process alone, made where it is not there yet.
 
     The "hash" of the question must agree; the `size` of chunks is that of a folder that is made anew.

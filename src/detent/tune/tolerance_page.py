@@ -1,5 +1,6 @@
 """The page of `detent tolerance`: how many are good, how each quantity spreads, what makes it do so, why cases fail."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,15 +94,15 @@ def _causes(found: "Tolerated") -> list[Figure]:
     """A tornado of each quantity with a limit, and the two keys that explain most of the first."""
     limited = [limit.quantity for limit in found.judged.limits if limit.quantity in found.sensitivities]
     named = list(dict.fromkeys([*limited, *found.sensitivities]))[: max(1, len(set(limited)))]
-    figures = [_tornado(name, found.sensitivities[name]) for name in named]
+    figures = [_tornado(name, found.sensitivities[name], found.total.get(name, {})) for name in named]
     if named and len(found.sensitivities[named[0]].order) > 1:
         figures.append(_scatter(found, named[0]))
     return figures
 
 
-def _tornado(name: str, one: Sensitivity) -> Figure:
+def _tornado(name: str, one: Sensitivity, total: Mapping[str, Index]) -> Figure:
     longest = max(*(index.value for index in one.share.values()), 1e-3)
-    rows = [
+    rows: list[list[str | Cell]] = [
         [_key(key), _bar(one.share[key], longest), offset_cell(one.rank[key].value, 1.0), _interval(one.share[key])]
         for key in one.order[:MOST_KEYS]
     ]
@@ -112,6 +113,11 @@ def _tornado(name: str, one: Sensitivity) -> Figure:
         "correlation says whether the quantity grows or falls with the key. What keys do together only, and what none "
         "explains, is the last row."
     )
+    if total:
+        heads.append(("share with others", True))
+        caption += " With others: alone, and together with other keys."
+        for row, key in zip(rows, [*one.order[:MOST_KEYS], ""], strict=True):
+            row.append(_percent(total[key]) if key else "")
     return Figure(title=f"What decides {name}", caption=caption, table=Table(heads=heads, rows=rows))
 
 
@@ -174,13 +180,17 @@ def _spread(found: "Tolerated", one: Quantity) -> Figure:
     seen, figure = values[np.isfinite(values)], found.figures[one.name]
     limits = [limit for limit in found.judged.limits if limit.quantity == one.name]
     near = [limit for limit in limits if _is_near(limit, figure.least, figure.most)]
-    shown, label = _in_units(np.array([*seen, *(limit.value for limit in near)]), one.unit, one.name)
-    marks = [(float(place), "limit") for place in shown[len(seen) :]]
+    worst = [known.value for known in found.worst if known.quantity == one.name]
+    shown, label = _in_units(np.array([*seen, *(limit.value for limit in near), *worst]), one.unit, one.name)
+    marks = list(
+        zip(map(float, shown[len(seen) :]), [*("limit" for _ in near), *("worst case" for _ in worst)], strict=True)
+    )
     chart: Chart = spread_chart(f"spread-{one.name.replace(' ', '-')}", shown[: len(seen)], (label, "cases"), marks)
     low, high, most, nominal = (
         format_quantity(value, one.unit, 3) for value in (figure.low, figure.high, figure.most, figure.nominal)
     )
     caption = f"90 % of all lie between {low} and {high}; the largest is {most}, that of the file {nominal}."
+    caption += f" The worst machine found has {format_quantity(worst[0], one.unit, 3)}." if worst else ""
     far = [format_quantity(limit.value, one.unit, 3) for limit in limits if limit not in near]
     caption += f" The limit, {' and '.join(far)}, is far away." if far else ""
     return Figure(title=one.name, caption=caption, charts=[chart])

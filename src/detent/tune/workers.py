@@ -7,52 +7,62 @@ import os
 import platform
 import sys
 import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from importlib import import_module
-from multiprocessing import get_context, parent_process
-from multiprocessing.connection import wait
+from itertools import islice
+from multiprocessing import connection, get_context, parent_process
 from typing import Any, cast
 
 from detent import __version__
 from detent.errors import DetentError
 from detent.kernel.cache import source_hash
 
-IN_FLIGHT = 4  # chunks that a Dask worker has, or waits for
+IN_FLIGHT = 4  # chunks that a worker has, or waits for: so many results at most wait to be taken
 RETRIES = 3
 
 Span = tuple[int, int]  # first case and number of cases
 Compute = Callable[[Any, int, int], Any]  # ``run_chunk(question, first, count)``
-Computed = Iterator[tuple[Span, Any]]
+Crew = AbstractContextManager[tuple[Executor, int]]  # who computes, and how many they are
 
 
-def in_threads(run: Compute, question: Any, spans: Sequence[Span], workers: int) -> Computed:
-    """Chunks as they are done, by threads: for a loop that runs without Python's lock."""
-    with ThreadPoolExecutor(workers) as pool:
-        yield from _pooled(pool, run, question, spans)
+def computed(crew: Crew, run: Compute, question: Any, spans: Sequence[Span]) -> Generator[tuple[Span, Any]]:
+    """Chunks as they are done, by a crew that is let go at the end; few wait for a worker, so that few are held."""
+    with crew as (pool, workers):
+        left, running = iter(spans), dict[Future[Any], Span]()
+        try:
+            while True:
+                for span in islice(left, IN_FLIGHT * workers - len(running)):
+                    running[pool.submit(run, question, *span)] = span
+                if not running:
+                    return
+                for one in wait(running, return_when=FIRST_COMPLETED).done:
+                    yield running.pop(one), one.result()
+        finally:
+            for one in running:
+                one.cancel()
 
 
-def in_processes(run: Compute, question: Any, spans: Sequence[Span], workers: int) -> Computed:
-    """Chunks as they are done, by processes, which end with this one."""
-    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_with_parent) as pool:
-        yield from _pooled(pool, run, question, spans)
+@contextmanager
+def threads(number: int) -> Generator[tuple[Executor, int]]:
+    """Threads of this process: for a loop that runs without Python's lock."""
+    with ThreadPoolExecutor(number) as pool:
+        yield pool, number
 
 
-def _pooled(pool: Executor, run: Compute, question: Any, spans: Sequence[Span]) -> Computed:
-    asked = {pool.submit(run, question, *span): span for span in spans}
-    try:
-        for done in as_completed(asked):
-            yield asked[done], done.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
+@contextmanager
+def processes(number: int) -> Generator[tuple[Executor, int]]:
+    """Processes of this machine, which end with this one."""
+    with ProcessPoolExecutor(number, get_context("spawn"), initializer=_end_with_parent) as pool:
+        yield pool, number
 
 
 def _end_with_parent() -> None:
     """A worker waits for work for ever; one whose parent was killed would stay."""
     parent = parent_process()
     if parent is not None:
-        threading.Thread(target=lambda: (wait([parent.sentinel]), os._exit(1)), daemon=True).start()
+        threading.Thread(target=lambda: (connection.wait([parent.sentinel]), os._exit(1)), daemon=True).start()
 
 
 def machine() -> dict[str, str]:
@@ -70,38 +80,23 @@ def identity() -> dict[str, str]:
     return {"detent": __version__, "numba": numba.__version__, "source hash": source_hash()}
 
 
-def on_dask(run: Compute, question: Any, spans: Sequence[Span], address: str) -> Computed:
-    """Chunks as they are done, by the workers of a Dask scheduler; results come here, and nothing else is shared.
+@contextmanager
+def dask(address: str) -> Generator[tuple[Executor, int]]:
+    """The workers of a Dask scheduler; results come here, and nothing else is shared.
 
     The address is that of the scheduler, as in ``tcp://host:8786``; "local:2" starts one here, with two workers. A
     worker with other sources is refused.
     """
     with _client(address) as client:
         _check_workers(client)
-        left, asked = list(spans)[::-1], dict[Any, Span]()
-
-        def ask() -> Any:
-            future = client.submit(run, question, *left[-1], pure=False, retries=RETRIES)
-            asked[future.key] = left.pop()
-            return future
-
-        most = IN_FLIGHT * len(client.scheduler_info(n_workers=-1)["workers"])
-        running = _dask().as_completed([ask() for _ in range(min(most, len(left)))], loop=client.loop)
-        for done in running:
-            yield asked.pop(done.key), _result(done)
-            if left:
-                running.add(ask())
-
-
-def _result(done: Any) -> Any:
-    """What a worker gave; where all that tried it were killed, that is an error of words."""
-    try:
-        return done.result()
-    except _dask().KilledWorker as error:
-        raise DetentError(
-            f"--dask: got workers that end while they compute ({error}); expected: workers with enough memory; look at "
-            "their logs, and run it again: with --store what was done stays"
-        ) from error
+        number = len(client.scheduler_info(n_workers=-1)["workers"])
+        try:
+            yield client.get_executor(pure=False, retries=RETRIES), number
+        except _dask().KilledWorker as error:
+            raise DetentError(
+                f"--dask: got workers that end while they compute ({error}); expected: workers with enough memory; "
+                "look at their logs, and run it again: with --store what was done stays"
+            ) from error
 
 
 def _dask() -> Any:

@@ -14,16 +14,22 @@ from numpy.typing import NDArray
 from detent.axisfile.tolerance import TABLE, Tolerance
 from detent.errors import DetentError
 from detent.files.fields import held_leaves, unit_of
+from detent.files.marks import signed
 from detent.files.patch import NewValue, patch
 from detent.files.problems import dotted, format_value
 from detent.files.text import write_text
 from detent.methods.method import untold
-from detent.tune.batch import DONE, Chunk, make_cases, quantities
+from detent.tune.batch import DONE, Chunk, Quantity, is_of_a_move, make_cases, quantities
 from detent.tune.cases import Numbers, Question
 from detent.tune.choice import Progress
 
 STARTS = 8  # of the worst cases of a sample, from which is looked further
 SWEEPS = 4  # over all values, at most
+
+
+def is_sought(one: Quantity) -> bool:
+    """True of what a job measures as a whole; margins and hunting are beside it."""
+    return one.name != DONE and not is_of_a_move(one) and " at " not in one.name
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,7 @@ class Worst:
     case: int  # number of that case
     values: Mapping[str, float]  # what makes the machine, by key that is toleranced, SI units
     least: bool = False  # the smallest is the worst, not the largest
+    file: Path | None = None  # its axis file
 
 
 def worst(
@@ -52,7 +59,8 @@ def worst(
     """
     chunks = list(chunks)
     known = [one.name for one in quantities(question)]
-    names = names or [name for name in known if name != DONE and not name.startswith("move ") and " at " not in name]
+    names = names or [one.name for one in quantities(question) if is_sought(one)]
+    tried = _Tried(question)
     for name in names:
         if name not in known:
             raise DetentError(f"worst: got {name!r}; expected: one of {', '.join(known)}; name one of these")
@@ -62,16 +70,36 @@ def worst(
     found = list[Worst]()
     for k, name in enumerate(names):
         progress(k / len(names), f"worst {name}")
-        search = _Search(question, name, -1.0 if name in least else 1.0)
+        search = _Search(tried, name, -1.0 if name in least else 1.0)
         found += search.run(np.concatenate([one.results[name] for one in chunks]), values, numbers)
     return found
+
+
+class _Tried:
+    """What machines do that were tried, for one quantity or another: most of the searches end at the same ones."""
+
+    def __init__(self, question: Question) -> None:
+        self.question = question
+        self.known = dict[bytes, dict[str, float]]()
+
+    def results(self, values: Mapping[str, Numbers], name: str) -> Numbers:
+        """A quantity of each machine with such values, shape (n,)."""
+        rows = np.ascontiguousarray(np.array(list(values.values())).T)
+        wanted = [row.tobytes() for row in rows]
+        new = {row: k for k, row in enumerate(wanted) if row not in self.known}
+        if new:
+            places = np.array(list(new.values()))
+            made, _ = make_cases(self.question, {key: each[places] for key, each in values.items()}, len(places))
+            for k, row in enumerate(new):
+                self.known[row] = {one: float(each[k]) for one, each in made.items()}
+        return np.array([self.known[row].get(name, np.nan) for row in wanted])
 
 
 @dataclass(frozen=True)
 class _Search:
     """The search for the worst of one quantity."""
 
-    question: Question
+    tried: _Tried
     name: str
     sign: float  # 1: the largest is the worst
 
@@ -85,7 +113,7 @@ class _Search:
         first = order[0]
         here, at = height[order], {key: each[order].copy() for key, each in values.items()}
         for _ in range(SWEEPS):
-            changed = [self._exchange(one, here, at) for one in self.question.tolerance]
+            changed = [self._exchange(one, here, at) for one in self.tried.question.tolerance]
             if not any(changed):
                 break
         best = int(np.argmax(here))
@@ -106,8 +134,7 @@ class _Search:
         count = len(here)
         tried = {key: np.repeat(each, len(places)) for key, each in at.items()}
         tried[one.key] = np.tile(places, count)
-        results, _ = make_cases(self.question, tried, count * len(places))
-        height = self._height(results[self.name]).reshape(count, len(places))
+        height = self._height(self.tried.results(tried, self.name)).reshape(count, len(places))
         best = np.argmax(height, axis=1)
         better = height[np.arange(count), best] > here
         here[better] = height[np.arange(count), best][better]
@@ -119,22 +146,21 @@ def worst_text(question: Question, found: Worst, job: str, name: str) -> str:
     """Text of the axis file of a worst machine; read again it makes the same machine, to the last bit.
 
     It is that of the file with other values, and says why, and how a person who calls it `name` and has the `job`
-    file sees the figure again.
+    file sees the figure again; without such a file it is the job that `detent tolerance` makes unless told otherwise.
     """
     unit = {one.name: one.unit for one in quantities(question)}[found.quantity]
     words = "least" if found.least else "largest"
     sets = "".join(f" --set '{key}={question.file.texts[key]}'" for key in _set_keys(question))
-    head = (
-        f"# The machine with the {words} {found.quantity} found: {found.value!r} {unit}".rstrip() + "\n"
-        f"#   detent run {name} --job {job}{sets} --json\n\n"
-    )
-    return head + patch(_untoleranced(question, found), list(_new_values(question, found)), question.name)[0]
+    again = f"run {name} --job {job}" if job else f"tolerance {name} --cases 1"
+    head = f"# The machine with the {words} {found.quantity} found: {found.value!r} {unit}".rstrip()
+    text = patch(_untoleranced(question, found), list(_new_values(question, found)), question.name)[0]
+    return signed(f"{head}\n#   detent {again}{sets} --json\n\n{text}")
 
 
 def write_worst(question: Question, found: Worst, path: str | Path, job: str = "", *, force: bool = False) -> Path:
     """Write the axis file of a worst machine; parameters as of `worst_text`, `force` replaces another's file."""
     target = Path(path)
-    return write_text(target, worst_text(question, found, job or question.job.name, target.name), force=force)
+    return write_text(target, worst_text(question, found, job, str(target)), force=force)
 
 
 def _set_keys(question: Question) -> list[str]:

@@ -5,12 +5,23 @@ import pickle
 
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
+from tests.standstill_rig import RIGID, rigid
 from tests.tolerance_rig import asked, quick
 
 import detent
 from detent.methods.batch import kind_of
 from detent.methods.moves.job import one_move
-from detent.tune.batch import Limit, Question, default_limits, quantities, run_chunk
+from detent.tune.batch import (
+    HUNTS,
+    STARTS,
+    SWING,
+    Limit,
+    Question,
+    default_limits,
+    quantities,
+    run_chunk,
+)
+from detent.tune.standstill import standstill
 
 
 def filtered(folder, tolerance: str):
@@ -75,3 +86,18 @@ def test_margins_are_quantities_where_they_are_asked_for(tmp_path):
     values = {key: float(each[1]) for key, each in chunk.values.items()}
     margins = question.method.linear(question.machine(values).spec).margins["command"]
     assert chunk.results["Ms at command"][1] == margins.sensitivity != chunk.results["Ms at command"][0]
+
+
+@pytest.mark.compiled
+def test_hunting_is_a_quantity_where_it_is_asked_for(tmp_path):
+    tolerance = '\n[tolerance]\n"mechanics.friction.positive.static" = ["39 N", "41 N"]\n'
+    (tmp_path / "slide.toml").write_text(quick(RIGID) + tolerance)
+    slide = detent.load(tmp_path / "slide.toml", rigid(40, 0.1).file.overrides)
+    question = Question.of(slide.file, one_move("none", 0.0, 0.0), hunt=True)
+    assert [one.unit for one in quantities(question)[-2:]] == ["", "m"]
+    assert default_limits(question)[-1] == Limit(HUNTS, 0.0)
+    chunk = run_chunk(question, 1, 1)
+    values = {key: float(each[0]) for key, each in chunk.values.items()}
+    found = standstill(question.machine(values).spec, STARTS, question.seed)
+    assert chunk.results[SWING][0] == found.swing > 0.0
+    assert chunk.results[HUNTS][0] == found.shares["hunts"] > 0.0

@@ -21,7 +21,21 @@ HERE = {span: computed({}, *span).results["error"].tobytes() for span in SPANS}
 
 
 def test_threads_give_every_chunk_once():
-    assert bits(workers.in_threads(computed, {}, SPANS, 2)) == HERE
+    assert bits(workers.computed(workers.threads(2), computed, {}, SPANS)) == HERE
+
+
+def test_few_chunks_wait_to_be_taken():
+    """Of a run of ten million cases memory holds those that somebody asked for."""
+    made = list[int]()
+
+    def noted(_question: object, first: int, _count: int) -> int:
+        made.append(first)
+        return first
+
+    found = workers.computed(workers.threads(1), noted, {}, SPANS)
+    assert next(found)[0] == (0, 100)
+    found.close()
+    assert len(made) <= workers.IN_FLIGHT
 
 
 def test_what_goes_wrong_in_a_chunk_ends_the_others():
@@ -29,21 +43,21 @@ def test_what_goes_wrong_in_a_chunk_ends_the_others():
         raise DetentError(f"case {first}")
 
     with pytest.raises(DetentError, match="case"):
-        list(workers.in_threads(wrong, {}, SPANS, 2))
+        list(workers.computed(workers.threads(2), wrong, {}, SPANS))
 
 
 @pytest.mark.process
 def test_processes_give_every_chunk_once():
-    assert bits(workers.in_processes(computed, {}, SPANS, 2)) == HERE
+    assert bits(workers.computed(workers.processes(2), computed, {}, SPANS)) == HERE
 
 
 @pytest.mark.process
 def test_a_worker_ends_with_its_parent(tmp_path):
     """One that is killed cannot tell its workers, which wait for work."""
     text = (
-        "import os, sys\nfrom tests.store_rig import computed\nfrom detent.tune.workers import in_processes\n"
+        "import os, sys\nfrom tests.store_rig import computed\nfrom detent.tune import workers\n"
         "if __name__ == '__main__':\n"
-        "    found = in_processes(computed, {'note': sys.argv[1]}, [(0, 9), (9, 9)], 1)\n"
+        "    found = workers.computed(workers.processes(1), computed, {'note': sys.argv[1]}, [(0, 9), (9, 9)])\n"
         "    next(found)\n    import multiprocessing\n"
         "    print(*(one.pid for one in multiprocessing.active_children()), flush=True)\n    os._exit(9)\n"
     )
@@ -60,13 +74,13 @@ def test_a_worker_ends_with_its_parent(tmp_path):
 
 def test_an_address_that_is_none_is_told():
     with pytest.raises(DetentError, match="local:2"):
-        list(workers.on_dask(computed, {}, SPANS, "local:two"))
+        list(workers.computed(workers.dask("local:two"), computed, {}, SPANS))
 
 
 def test_without_dask_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(DetentError, match=r"detent\[dask\]"):
-        list(workers.on_dask(computed, {}, SPANS, "local:2"))
+        list(workers.computed(workers.dask("local:2"), computed, {}, SPANS))
 
 
 class Answering:
@@ -102,5 +116,5 @@ def test_workers_that_may_give_other_bits_are_refused_by_name(answers, told):
 @pytest.mark.wide
 def test_dask_gives_every_chunk_once_though_a_worker_is_killed(tmp_path):
     question = {"killed at": 400, "once": str(tmp_path / "once")}
-    assert bits(workers.on_dask(killed_once, question, SPANS, "local:2")) == HERE
+    assert bits(workers.computed(workers.dask("local:2"), killed_once, question, SPANS)) == HERE
     assert (tmp_path / "once").exists()

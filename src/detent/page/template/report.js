@@ -108,8 +108,9 @@
       const at = verticalLine(u, x, [6, 4], colour("bad"));
       if (at === null) continue;
       ctx.fillStyle = colour("bad");
-      ctx.textAlign = x > 0 ? "left" : "right";
-      ctx.fillText(label, at + (x > 0 ? 4 : -4) * scale, bbox.top + 12 * scale);
+      const fits = at + 4 * scale + ctx.measureText(label).width <= bbox.left + bbox.width;
+      ctx.textAlign = x > 0 && fits ? "left" : "right";
+      ctx.fillText(label, at + (x > 0 && fits ? 4 : -4) * scale, bbox.top + 12 * scale);
     }
   };
 
