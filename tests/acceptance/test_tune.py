@@ -11,7 +11,7 @@ import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
 from tests.identify_files import columns_of, write_log
-from tests.standstill_rig import RIGID, both, drawn, example, rigid, told
+from tests.standstill_rig import RIGID, axis, both, drawn, example, rigid, told
 from tests.store_rig import QUESTION, fill, fill_killed, run_killed
 from tests.tolerance_rig import (
     FORCE_PID,
@@ -861,3 +861,36 @@ def test_39_the_filtered_servo_by_processes(tmp_path):
     chunks = chunks_of(rubs, 300)
     assert len(chunks) > 2
     assert case_of(run_chunk(rubs, 171, 1), 171)[1]["error"] == results["error"][171]
+
+
+FREE_EDGE = [*both(coulomb="0 N", static="0 N"), "encoder.resolution=10 um", "method.velocity_integral=0 V/m",
+             "drive.command_step=0 V"]  # fmt: skip
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize(("time", "swing", "frequency"), [("0.3 ms", 0.157, 333), ("1 ms", 0.187, 200)])
+def test_22_the_edge_of_a_count_is_told_as_flicker_with_the_command_it_costs(time, swing, frequency):
+    """Tsypkin's cycle has one period; the simulated ones mix two, and their turns are up to a quarter off."""
+    found = axis(RIGID, [*FREE_EDGE, f"encoder.velocity_filter={time}"]).hunt(starts=12)
+    kind = max(found.standing.kinds_of("flickers"), key=lambda one: len(one.found))
+    (edge,) = found.standing.ensemble.forecasts
+    assert found.standing.outcome == "flickers"
+    assert kind.name == edge.kind == "count edge"
+    assert edge.swing == near(swing * 10e-6, 1e-2)
+    assert 1.0 / edge.period == near(frequency, 1e-2)
+    assert kind.swing("motor") == near(swing * 10e-6, 0.15)
+    assert 1.0 / kind.period == near(frequency, 0.25)
+    assert kind.command == near(edge.command, 0.1)
+    assert any(one.startswith("flicker: count edge") and "its command goes to and fro by" in one for one in found.told)
+
+
+@pytest.mark.wide
+def test_20_the_describing_function_of_the_limit_agrees_beyond_the_margin():
+    """It counts the fundamental alone: what wanders beside it, and across the counts, makes the whole swing larger."""
+    found = example("method.velocity_gain=600 V*s/m").hunt(starts=12)
+    (cycle,), simulated = found.standing.ensemble.forecasts, found.standing.kinds[0]
+    assert cycle.kind == simulated.name == "beyond the margin"
+    assert 1.0 / cycle.period == near(404, 1e-2)
+    assert 12e-6 < cycle.swing < 26e-6
+    assert 0.5 < cycle.swing / simulated.swing("motor") < 1.1
+    assert any("describing function of its limit" in one and "simulated" in one for one in found.told)

@@ -103,6 +103,17 @@ class Rule:
     why: str  # which constant to change, in a sentence
 
 
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """A cycle that a closed form forecasts, to be shown beside the simulation."""
+
+    kind: str  # as `Ensemble.kind` calls it
+    by: str  # the closed form
+    swing: float  # of the mass that moves farther, peak to peak [m]
+    period: float  # [s]
+    command: float  # peak to peak [V]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Swing:
     """How an axis moves that does not come to rest, from one start."""
@@ -155,6 +166,11 @@ class Ensemble(Protocol):
     """Key of the dead band that stops hunting; empty where there is none."""
     integral: str
     """Key of the integral gain."""
+
+    @property
+    def forecasts(self) -> Sequence[Forecast]:
+        """What closed forms say of cycles that need no friction."""
+        return ()
 
     def courses(self, starts: int, seed: int, *, on_counts: bool) -> "Sequence[Course]":
         """The axis at its starts, each the same however many there are."""

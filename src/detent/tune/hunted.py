@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ RATIOS = 1.0, 1.15, 1.5, 2.0  # static over Coulomb friction that is tried where
 SPEEDS = 0.0, 0.3e-3, 1e-3, 3e-3  # Stribeck velocities [m/s]
 TABLE_STARTS = 12
 PLACES = 64  # errors of the return map
+QUICK = 0.05  # period below which a frequency is told [s]
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,12 +91,16 @@ class Hunted(OnScreen):
         """Largest swing of a start that flickers [m]."""
         return max((one.swing.largest for one in self.standing.found if one.outcome == FLICKERS), default=0.0)
 
+    def often(self, period: float) -> str:
+        """How often, in words; NaN where it does not repeat."""
+        if 0.0 < period < QUICK:
+            return f"at {format_quantity(1.0 / period, 'Hz', 3)}"
+        return "irregularly" if math.isnan(period) else f"every {format_quantity(period, 's', 3)}"
+
     def motion(self, kind: Kind) -> str:
         """How far and how often, in words."""
         motor, load = kind.swing("motor"), kind.swing("load")
-        every = "irregularly" if math.isnan(kind.period) else f"every {format_quantity(kind.period, 's', 3)}"
-        if 0.0 < kind.period < 0.05:
-            every = f"at {format_quantity(1.0 / kind.period, 'Hz', 3)}"
+        every = self.often(kind.period)
         what = f"the load by {self.length(load)}, the motor by {self.length(motor)}"
         if abs(motor - load) < 0.1 * max(motor, load):
             what = f"by {self.length(max(motor, load))}"
@@ -121,6 +126,7 @@ class Hunted(OnScreen):
             yield f"rule of thumb: {self.length(rule.swing)} every {every}; {simulated}; what helps: {rule.why}"
         else:
             yield f"rule of thumb: no stick-slip, for {rule.why}"
+        yield from self._edges_told()
         if self.cured is not None:
             yield "targets on counts of the encoder " + ("stop it" if self.cured else "do not stop it")
         if self.band is not None:
@@ -133,6 +139,18 @@ class Hunted(OnScreen):
                 "the file does not state static and stribeck everywhere, and the verdict depends on them: of "
                 f"{len(self.assumed)} that may be, it {seen}; record slow moves with reversals (`detent identify`)"
             )
+
+    def _edges_told(self) -> Iterator[str]:
+        """What a flicker costs, and closed forms beside the simulation."""
+        flickering, unit = self.standing.kinds_of(FLICKERS), "V"
+        for kind in flickering:
+            cost = f"its command goes to and fro by {format_quantity(kind.command, unit, 3)}"
+            yield f"flicker: {self.motion(kind)} ({len(kind.found)} of {len(self.standing.found)} starts); {cost}"
+        for one in self.standing.ensemble.forecasts:
+            alike = [kind for kind in [*self.standing.kinds, *flickering] if kind.name == one.kind]
+            simulated = f"simulated {self.motion(alike[0]).partition(', ')[2]}" if alike else "the simulation does not"
+            far, command = self.length(one.swing), format_quantity(one.command, unit, 3)
+            yield f"{one.kind} by {one.by}: {far} {self.often(one.period)}, the command by {command}; {simulated}"
 
     def _band_told(self, band: Band) -> str:
         """Width and cost of the dead band."""
@@ -246,6 +264,7 @@ class Hunted(OnScreen):
             "seed": self.standing.seed, "on_counts": self.standing.on_counts, "shares": dict(self.standing.shares),
             "kinds": [_kind(one) for one in self.standing.kinds],
             "rule": {"swing": rule.swing, "period": _finite(rule.period)}, "cured_on_counts": self.cured,
+            "forecasts": [asdict(one) for one in self.standing.ensemble.forecasts],
             "dead_band": None if self.band is None else _band(self.band),
             "assumed": [{"ratio": ratio, "stribeck": speed, "outcome": one.outcome, "swing": one.swing}
                         for ratio, speed, one in self.assumed],
@@ -260,6 +279,7 @@ def _finite(value: float) -> float | None:
 def _kind(one: Kind) -> dict[str, Any]:
     return {
         "name": one.name, "motor": one.swing("motor"), "load": one.swing("load"), "period": _finite(one.period),
+        "command": one.command,
         "largest": one.worst.swing.largest, "starts": len(one.found), "of": one.starts, "by_itself": one.by_itself,
     }  # fmt: skip
 
