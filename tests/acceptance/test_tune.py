@@ -12,6 +12,7 @@ from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
 from tests.identify_files import columns_of, write_log
 from tests.standstill_rig import RIGID, axis, both, drawn, example, rigid, told
+from tests.standstill_truth import AXES, PAGE, WITHIN, compare, each, hunting, truth_of, truths
 from tests.store_rig import QUESTION, fill, fill_killed, run_killed
 from tests.tolerance_rig import (
     FORCE_PID,
@@ -894,3 +895,38 @@ def test_20_the_describing_function_of_the_limit_agrees_beyond_the_margin():
     assert 12e-6 < cycle.swing < 26e-6
     assert 0.5 < cycle.swing / simulated.swing("motor") < 1.1
     assert any("describing function of its limit" in one and "simulated" in one for one in found.told)
+
+
+@pytest.mark.wide
+def test_21_the_forecast_of_a_few_drawn_axes_is_that_of_brute_force():
+    found = compare([one for one in truths() if one.number % 5 == 1])
+    assert all(one.right for one in found), [each(one) for one in found]
+    assert len(hunting(found)) >= 4
+    assert sum(abs(one.off) <= WITHIN for one in hunting(found)) >= 0.9 * len(hunting(found))
+
+
+@pytest.mark.long
+def test_21_the_forecast_of_drawn_axes_is_that_of_brute_force():
+    kept = truths()
+    found = compare(kept)
+    assert len(found) >= AXES - 1  # one creeps on an ideal encoder: its truth takes as long as that of all others
+    assert sum(one.right for one in found) >= 0.95 * len(found), [each(one) for one in found if not one.right]
+    both_hunt = hunting(found)
+    assert 0.2 * AXES < len(both_hunt) < 0.6 * AXES  # drawn so that a forecast that is always the same is wrong
+    assert sum(abs(one.off) <= WITHIN for one in both_hunt) >= 0.9 * len(both_hunt), [each(one) for one in both_hunt]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", [6, 12, 27, 38])
+def test_21_the_truth_is_found_again(number):
+    kept = truths()[number]
+    again = truth_of(number)
+    assert again.hunting == kept.hunting
+    assert again.swing == near(kept.swing, 1e-2)
+
+
+def test_21_the_page_has_a_row_for_each_drawn_axis_that_hunts():
+    rows = re.findall(r"(?m)^\| (\d+) \|.*?\| (\d+) of 48 \|", PAGE.read_text(encoding="utf-8"))
+    assert {int(number): int(count) for number, count in rows if count != "0"} == {
+        one.number: one.hunting for one in truths() if one.hunting
+    }
