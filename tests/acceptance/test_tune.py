@@ -15,6 +15,8 @@ from tests.cascade_rig import BY_HAND, by_hand
 from tests.identify_files import columns_of, write_log
 from tests.live_browser import run_script
 from tests.standstill_rig import RIGID, both, drawn, example, rigid, told
+from tests.standstill_rig import RIGID, axis, both, drawn, example, rigid, told
+from tests.standstill_truth import AXES, PAGE, WITHIN, compare, each, hunting, truth_of, truths
 from tests.store_rig import QUESTION, fill, fill_killed, run_killed
 from tests.tolerance_rig import (
     FORCE_PID,
@@ -993,3 +995,69 @@ def test_40_reports_open_without_a_network_and_on_a_telephone(verb, tmp_path):
     assert seen["charts"] >= 3
     assert seen["wide"] == 360  # it does not scroll sideways
     assert axis.name in seen["heading"]
+FREE_EDGE = [*both(coulomb="0 N", static="0 N"), "encoder.resolution=10 um", "method.velocity_integral=0 V/m",
+             "drive.command_step=0 V"]  # fmt: skip
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize(("time", "swing", "frequency"), [("0.3 ms", 0.157, 333), ("1 ms", 0.187, 200)])
+def test_22_the_edge_of_a_count_is_told_as_flicker_with_the_command_it_costs(time, swing, frequency):
+    """Tsypkin's cycle has one period; the simulated ones mix two, and their turns are up to a quarter off."""
+    found = axis(RIGID, [*FREE_EDGE, f"encoder.velocity_filter={time}"]).hunt(starts=12)
+    kind = max(found.standing.kinds_of("flickers"), key=lambda one: len(one.found))
+    (edge,) = found.standing.ensemble.forecasts
+    assert found.standing.outcome == "flickers"
+    assert kind.name == edge.kind == "count edge"
+    assert edge.swing == near(swing * 10e-6, 1e-2)
+    assert 1.0 / edge.period == near(frequency, 1e-2)
+    assert kind.swing("motor") == near(swing * 10e-6, 0.15)
+    assert 1.0 / kind.period == near(frequency, 0.25)
+    assert kind.command == near(edge.command, 0.1)
+    assert any(one.startswith("flicker: count edge") and "its command goes to and fro by" in one for one in found.told)
+
+
+@pytest.mark.wide
+def test_20_the_describing_function_of_the_limit_agrees_beyond_the_margin():
+    """It counts the fundamental alone: what wanders beside it, and across the counts, makes the whole swing larger."""
+    found = example("method.velocity_gain=600 V*s/m").hunt(starts=12)
+    (cycle,), simulated = found.standing.ensemble.forecasts, found.standing.kinds[0]
+    assert cycle.kind == simulated.name == "beyond the margin"
+    assert 1.0 / cycle.period == near(404, 1e-2)
+    assert 12e-6 < cycle.swing < 26e-6
+    assert 0.5 < cycle.swing / simulated.swing("motor") < 1.1
+    assert any("describing function of its limit" in one and "simulated" in one for one in found.told)
+
+
+@pytest.mark.wide
+def test_21_the_forecast_of_a_few_drawn_axes_is_that_of_brute_force():
+    found = compare([one for one in truths() if one.number % 5 == 1])
+    assert all(one.right for one in found), [each(one) for one in found]
+    assert len(hunting(found)) >= 4
+    assert sum(abs(one.off) <= WITHIN for one in hunting(found)) >= 0.9 * len(hunting(found))
+
+
+@pytest.mark.long
+def test_21_the_forecast_of_drawn_axes_is_that_of_brute_force():
+    kept = truths()
+    found = compare(kept)
+    assert len(found) >= AXES - 1  # one creeps on an ideal encoder: its truth takes as long as that of all others
+    assert sum(one.right for one in found) >= 0.95 * len(found), [each(one) for one in found if not one.right]
+    both_hunt = hunting(found)
+    assert 0.2 * AXES < len(both_hunt) < 0.6 * AXES  # drawn so that a forecast that is always the same is wrong
+    assert sum(abs(one.off) <= WITHIN for one in both_hunt) >= 0.9 * len(both_hunt), [each(one) for one in both_hunt]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", [6, 12, 27, 38])
+def test_21_the_truth_is_found_again(number):
+    kept = truths()[number]
+    again = truth_of(number)
+    assert again.hunting == kept.hunting
+    assert again.swing == near(kept.swing, 1e-2)
+
+
+def test_21_the_page_has_a_row_for_each_drawn_axis_that_hunts():
+    rows = re.findall(r"(?m)^\| (\d+) \|.*?\| (\d+) of 48 \|", PAGE.read_text(encoding="utf-8"))
+    assert {int(number): int(count) for number, count in rows if count != "0"} == {
+        one.number: one.hunting for one in truths() if one.hunting
+    }

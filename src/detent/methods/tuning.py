@@ -140,6 +140,17 @@ class Rule:
     why: str  # which constant to change, in a sentence
 
 
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """A cycle that a closed form forecasts, to be shown beside the simulation."""
+
+    kind: str  # as `Ensemble.kind` calls it
+    by: str  # the closed form
+    swing: float  # of the mass that moves farther, peak to peak [m]
+    period: float  # [s]
+    command: float  # peak to peak [V]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Swing:
     """How an axis moves that does not come to rest, from one start."""
@@ -224,6 +235,11 @@ class Ensemble(Protocol):
     def earlier(self) -> "tuple[str, Any] | None":
         """A phase before that of rest: its name, and the specification of an axis that never leaves it."""
         return None
+
+    @property
+    def forecasts(self) -> Sequence[Forecast]:
+        """What closed forms say of cycles that need no friction."""
+        return ()
 
     def courses(self, starts: int, seed: int, *, on_counts: bool) -> "Sequence[Course]":
         """The axis at its starts, each the same however many there are."""

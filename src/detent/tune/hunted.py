@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ SPEEDS = 0.0, 0.3e-3, 1e-3, 3e-3  # Stribeck velocities [m/s]
 TABLE_STARTS = 12
 EARLIER = 2.0  # of a phase before that of rest, which does not last, that is simulated at most [s]
 PLACES = 64  # errors of the return map
+QUICK = 0.05  # period below which a frequency is told [s]
 
 
 @dataclass(frozen=True, repr=False)
@@ -94,12 +95,16 @@ class Hunted(OnScreen):
         """Largest swing of a start that flickers [m]."""
         return max((one.swing.largest for one in self.standing.found if one.outcome == FLICKERS), default=0.0)
 
+    def often(self, period: float) -> str:
+        """How often, in words; NaN where it does not repeat."""
+        if 0.0 < period < QUICK:
+            return f"at {format_quantity(1.0 / period, 'Hz', 3)}"
+        return "irregularly" if math.isnan(period) else f"every {format_quantity(period, 's', 3)}"
+
     def motion(self, kind: Kind) -> str:
         """How far and how often, in words."""
         motor, load = kind.swing("motor"), kind.swing("load")
-        every = "irregularly" if math.isnan(kind.period) else f"every {format_quantity(kind.period, 's', 3)}"
-        if 0.0 < kind.period < 0.05:
-            every = f"at {format_quantity(1.0 / kind.period, 'Hz', 3)}"
+        every = self.often(kind.period)
         what = f"the load by {self.length(load)}, the motor by {self.length(motor)}"
         if abs(motor - load) < 0.1 * max(motor, load):
             what = f"by {self.length(max(motor, load))}"
@@ -118,6 +123,7 @@ class Hunted(OnScreen):
             why = "; it hunts by itself" if kind.by_itself else "; a knock starts it: small starts come to rest"
             yield f"{self.motion(kind)} ({share}{'' if self.standing.ensemble.single else why})"
         yield from self._rule_told()
+        yield from self._edges_told()
         if self.earlier is not None:
             when, found = self.earlier
             kinds = [*found.kinds, *found.kinds_of(FLICKERS)]
@@ -151,6 +157,18 @@ class Hunted(OnScreen):
             yield f"rule of thumb: {self.length(rule.swing)} every {every}; {simulated}; what helps: {rule.why}"
         else:
             yield f"rule of thumb: no stick-slip, for {rule.why}"
+
+    def _edges_told(self) -> Iterator[str]:
+        """What a flicker costs, and closed forms beside the simulation."""
+        flickering, unit = self.standing.kinds_of(FLICKERS), self.standing.ensemble.command_unit
+        for kind in flickering:
+            cost = f"its command goes to and fro by {format_quantity(kind.command, unit, 3)}"
+            yield f"flicker: {self.motion(kind)} ({len(kind.found)} of {len(self.standing.found)} starts); {cost}"
+        for one in self.standing.ensemble.forecasts:
+            alike = [kind for kind in [*self.standing.kinds, *flickering] if kind.name == one.kind]
+            simulated = f"simulated {self.motion(alike[0]).partition(', ')[2]}" if alike else "the simulation does not"
+            far, command = self.length(one.swing), format_quantity(one.command, unit, 3)
+            yield f"{one.kind} by {one.by}: {far} {self.often(one.period)}, the command by {command}; {simulated}"
 
     def _band_told(self, band: Band) -> str:
         """Width and cost of the dead band."""
@@ -271,6 +289,7 @@ class Hunted(OnScreen):
             "seed": self.standing.seed, "on_counts": self.standing.on_counts, "shares": dict(self.standing.shares),
             "kinds": [_kind(one) for one in self.standing.kinds],
             "rule": None if rule is None else {"swing": rule.swing, "period": _finite(rule.period)},
+            "forecasts": [asdict(one) for one in self.standing.ensemble.forecasts],
             "cured_on_counts": self.cured, "earlier": None if self.earlier is None else _phase(*self.earlier),
             "dead_band": None if self.band is None else _band(self.band),
             "assumed": [{"ratio": ratio, "stribeck": speed, "outcome": one.outcome, "swing": one.swing}
@@ -286,6 +305,7 @@ def _finite(value: float) -> float | None:
 def _kind(one: Kind) -> dict[str, Any]:
     return {
         "name": one.name, "motor": one.swing("motor"), "load": one.swing("load"), "period": _finite(one.period),
+        "command": one.command,
         "largest": one.worst.swing.largest, "starts": len(one.found), "of": one.starts, "by_itself": one.by_itself,
     }  # fmt: skip
 

@@ -35,7 +35,7 @@ def tuned_page(found: "Tuned") -> Page:
         title=f"{found.before.file.spec.axis.name}: tuned",
         headline=Headline(
             level=level, verdict=verdict, name=found.before.file.spec.axis.name, kicker="Choice of gains",
-            lead=f"{found.sentence} {' '.join(found.why)}",
+            lead=f"{found.sentence} {' '.join(found.why)}".replace("`", ""),
         ),
         cards=_cards(found),
         notes=[Note("warning", str(one)) for one in found.refusals],

@@ -79,6 +79,11 @@ class Kind:
         """Median [s]."""
         return float(np.median([one.swing.period for one in self.found]))
 
+    @property
+    def command(self) -> float:
+        """Median swing of the command [V]."""
+        return float(np.median([one.swing.command for one in self.found]))
+
     def swing(self, mass: str) -> float:
         """Median swing of "motor" or "load" [m]."""
         return float(np.median([getattr(one.swing, mass) for one in self.found]))

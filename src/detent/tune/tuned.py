@@ -99,7 +99,11 @@ class Tuned(Chosen):
             remedy = "a dead band of half of that and half a count stops such motion"
             told.append(f"At standstill it {self.after.at_rest}: {remedy}.")
             if not self.after.stood.ensemble.stated:
-                told.append("That depends on static friction and Stribeck velocity, which the file does not state.")
+                told.append(
+                    "That depends on static friction and Stribeck velocity, which the file does not state: "
+                    "`detent hunt` has a table of what it does with others; slow moves with reversals, recorded, tell "
+                    "which it is."
+                )
         return told
 
     @cached_property

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
-from tests.standstill_rig import RIGID, both, example, rigid
+from tests.standstill_rig import RIGID, axis, both, example, rigid
 from typer.testing import CliRunner
 
 import detent
 from detent.cli.app import app
 from detent.errors import DetentError
 from detent.methods.cascade.standstill import CascadeEnsemble
+from detent.methods.tuning import Swing
 from detent.tune import dead_band, hunted, standstill
 
 STICKS = [*both(coulomb="20 N", static="30 N", stribeck="0 m/s"), "drive.command_step=0 V", "encoder.resolution=0.1 um"]
@@ -171,3 +172,23 @@ def test_a_method_without_a_dead_band_says_so(words, monkeypatch):
     monkeypatch.setattr(CascadeEnsemble, "band", "")
     with pytest.raises(DetentError, match="no dead band of its integral"):
         rigid(30, 0).hunt(**words)
+
+
+def test_a_flicker_is_told_with_the_command_it_costs_and_closed_forms_beside_it():
+    def stood(start: str):
+        swing = Swing(motor=1.5e-6, load=1.5e-6, period=4e-3, command=4.5, held=0.0, limited=0.0)
+        told = {"proven": True, "error": 0.0, "moved": True, "simulated": 1.0, "leapt": 0.0}
+        return standstill.Stood(start=start, outcome="flickers", swing=swing, **told)
+
+    free = [*both(coulomb="0 N", static="0 N"), "drive.command_step=0 V", "method.velocity_integral=0 V/m"]
+    made = axis(RIGID, [*free, "encoder.resolution=10 um"])
+    standing = standstill.Standstill(CascadeEnsemble(made.spec), [stood("small"), stood("wide")])
+    found = hunted.Hunted(made.file, standing, None, None, None, [])
+    flicker, edge = found.told[1:]
+    assert flicker == "flicker: count edge, by 1.5 um at 250 Hz (2 of 2 starts); its command goes to and fro by 4.5 V"
+    assert edge == (
+        "count edge by Tsypkin's method: 1.57 um at 333 Hz, the command by 4.53 V; simulated by 1.5 um at 250 Hz"
+    )
+    assert found.to_dict()["forecasts"][0]["kind"] == "count edge"
+    alone = hunted.Hunted(made.file, standstill.Standstill(standing.ensemble, []), None, None, None, [])
+    assert alone.told[-1].endswith("the simulation does not")

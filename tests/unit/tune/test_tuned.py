@@ -160,6 +160,7 @@ def test_gains_that_hunt_are_told_so_with_what_stops_it_and_what_it_depends_on()
     assert told.to_dict()["after"]["standstill"]["swing"] == told.after.stood.swing > 1e-6
     last = told.why[-2:]
     assert "dead band" in last[0]
+    assert "`detent hunt` has a table" in last[1]
     assert "does not state" in last[1]  # of the load, whose static friction is a default
     assert {name: text for name, _, text in told.rows}["standstill"].startswith("hunts from ")
 

@@ -17,11 +17,12 @@ import math
 from functools import cached_property
 from importlib import import_module
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.analysis.count_edge import EdgeCycle, edge_cycle
 from detent.analysis.linear_system import (
     LinearSystem,
     Margins,
@@ -37,6 +38,7 @@ Numbers = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
 
 LARGEST_MARGIN = 1e3  # largest gain margin that is looked for
+SWINGING = 1.0 - 1e-3  # of the largest factor of a mode: those that neither decay nor grow at the gain margin
 WELL_APART = 1e8  # condition of the modes up to which responses are sums over them
 
 
@@ -60,6 +62,14 @@ def machine_of(spec: CascadeSpec) -> Any:
         pendulum=mechanics.pendulum,
         loss=mechanics.transmission_loss,
     )
+
+
+class LimitCycle(NamedTuple):
+    """How a loop beyond its gain margin swings."""
+
+    frequency: float  # [Hz]
+    motor: float  # peak to peak [m]
+    load: float
 
 
 class LinearLoop:
@@ -131,24 +141,33 @@ class LinearLoop:
         a, b, c, d = after[:, :-1], after[:, -1:], out[None, :-1], out[None, -1:]
         return LinearSystem(a=a, b=b, c=c, d=d, dt=self.period, name=f"{cut} loop")
 
+    @property
+    def edge(self) -> EdgeCycle | None:
+        """The longest cycle across the edge of a count of the position's encoder, for a count of 1."""
+        after, out = self._sample("encoder")
+        return edge_cycle(after[:, :-1], after[:, -1], out[0, :-1], out[1, :-1], float(out[1, -1]))
+
     def _sample(self, cut: str, more: float = 1.0) -> tuple[Numbers, Numbers]:
         """What a sample makes of the state and of what is put in at a cut: the state after it, and what comes out.
 
-        Quantities of a sample are rows over the state before it and, last, what is put in.
+        Quantities of a sample are rows over the state before it and, last, what is put in. Cut at the encoder, the
+        place that it is to read and the command come out.
         """
         read = self.velocity_sensor
         sizes = [len(self.plant.b), self.position_sensor.delay, read.delay + read.velocity_span, self.spec.drive.delay]
         parts: list[Numbers] = np.split(np.eye(sum(sizes) + 4), np.cumsum(sizes))
         x, positions, places, commands, rest = parts
-        positions = np.vstack([x[self.position_place], positions])
-        places = np.vstack([x[self.velocity_place], places])
         velocity, integral, filtered, put_in = rest
+        at_encoder, shared = cut == "encoder", self.position_sensor is self.velocity_sensor
+        positions = np.vstack([put_in if at_encoder else x[self.position_place], positions])
+        places = np.vstack([put_in if at_encoder and shared else x[self.velocity_place], places])
         difference = (places[read.delay] - places[-1]) / (read.velocity_span * self.period)
         velocity = velocity + self.velocity_share * (difference - velocity)
         position_meas = {"position": put_in, "velocity": 0.0 * put_in}.get(cut, positions[-1])
         velocity_meas = put_in if cut == "velocity" else velocity
         command, integral, filtered = self._law(position_meas, velocity_meas, integral, filtered)
         out = -{"position": positions[-1], "velocity": velocity}.get(cut, command)
+        out = np.vstack([x[self.position_place], command]) if at_encoder else out
         commands = np.vstack([put_in if cut == "command" else command, commands])
         held, driven = self.held
         plant = held @ x + np.outer(driven, more * self.gain * commands[-1])
@@ -186,6 +205,32 @@ class LinearLoop:
         loops makes a loop that settles neither with much nor with little gain.
         """
         return gain_limit(lambda more: _radius(self.transition(more)), LARGEST_MARGIN)
+
+    @cached_property
+    def limited(self) -> LimitCycle | None:
+        """How a loop swings that does not settle: as far as its limit lets it; None where it settles, or nowhere.
+
+        The limit weakens a swinging command by N(r) = 2/pi (asin r + r sqrt(1 - r^2)), r its share that passes
+        (Gelb, Vander Velde 1968, section 2.3), until the loop is at its gain margin.
+        """
+        margin = self.gain_margin
+        if not 0.0 < margin < 1.0:
+            return None
+        modes = np.linalg.eigvals(self.transition(margin))
+        frequency = float(np.abs(np.angle(modes[np.abs(modes) > SWINGING * np.max(np.abs(modes))])).max())
+        if frequency == 0.0:
+            return None
+        low, high = 0.0, 1.0
+        while high - low > 1e-9:
+            middle = 0.5 * (low + high)
+            weaker = 2.0 / math.pi * (math.asin(middle) + middle * math.sqrt(1.0 - middle * middle))
+            low, high = (middle, high) if weaker < margin else (low, middle)
+        passed = margin / high * self.spec.largest_command  # fundamental of what the limit lets through
+        held, driven = self.held
+        through = np.exp(1j * frequency) * np.eye(len(driven)) - held
+        states = np.abs(np.linalg.solve(through, self.gain * passed * driven.astype(np.complex128)))
+        places = states[[self.plant.motor, self.plant.load]]
+        return LimitCycle(frequency / (math.tau * self.period), *(2.0 * places).tolist())
 
     def _open_loops(self, frequencies: Numbers) -> tuple[Phasors, Phasors]:
         """Velocity loop, and position loop with that inside it closed; of a PID no velocity loop, and all of it."""

@@ -20,7 +20,7 @@ from detent.methods.cascade.loop import LinearLoop
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.standstill_steps import Watch, watch_standstill
 from detent.methods.cascade.system import Cascade, along, latch_both, switch_on
-from detent.methods.tuning import COLUMNS, Ensemble, Rule, Swing
+from detent.methods.tuning import COLUMNS, Ensemble, Forecast, Rule, Swing
 from detent.sensing.position_sensor import stand_sensor
 
 Numbers = NDArray[np.float64]
@@ -176,6 +176,23 @@ class CascadeEnsemble(Ensemble):
         swing = (static - moving) / self.stiffness
         why = "less static friction, a stiffer position loop, or no integral"
         return Rule(swing, 4.0 * (static + moving) / (self.growth * swing), why)
+
+    @property
+    def forecasts(self) -> list[Forecast]:
+        """Across the edge of a count, where friction does not hold what that costs; as far as the limit lets it."""
+        loop, spec, found = LinearLoop(self.spec), self.spec, list[Forecast]()
+        edge = loop.edge if self.count > 0.0 and self.gap == 0.0 and loop.spectral_radius < 1.0 else None
+        if edge is not None:
+            command, most = edge.command * self.count, 2.0 * max(self._static) / spec.effort_per_command
+            period = 2 * edge.half * loop.period
+            if most < command < 2.0 * spec.largest_command:
+                found.append(Forecast("count edge", "Tsypkin's method", edge.swing * self.count, period, command))
+        swinging = loop.limited
+        if swinging is not None:
+            far, both = max(swinging.motor, swinging.load), 2.0 * spec.largest_command
+            how = "the describing function of its limit"
+            found.append(Forecast("beyond the margin", how, far, 1.0 / swinging.frequency, both))
+        return found
 
     def _fall(self) -> float:
         """Steepest fall of friction from static to Coulomb [N*s/m], of both masses and the weaker direction."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.standstill_rig import both, example, rigid
+from tests.standstill_rig import RIGID, axis, both, example, rigid
 
 from detent.errors import DetentError
 from detent.methods.cascade.standstill import CascadeEnsemble
@@ -111,8 +111,8 @@ def test_a_leap_leaves_what_the_same_samples_one_by_one_leave(more):
 
 
 def test_rest_is_proven_where_nothing_integrates_and_in_a_dead_band():
-    for axis in (rigid(30, 0.1, integral=0), rigid(30, 0.1, "method.dead_band=20 um")):
-        course = CascadeEnsemble(axis.spec).courses(1, 1, on_counts=False)[0]
+    for one in (rigid(30, 0.1, integral=0), rigid(30, 0.1, "method.dead_band=20 um")):
+        course = CascadeEnsemble(one.spec).courses(1, 1, on_counts=False)[0]
         course.feed[0][0] = course.state.controller.motor_sensor.position + 5e-6
         found = watch(course, 0.1e-6, 1.0)
         assert (found.outcome, found.proven) == ("rests", True)
@@ -136,3 +136,36 @@ def test_a_method_that_is_not_watched_says_so():
     spec = detent.load(detent.example("print_head.toml")).spec
     with pytest.raises(DetentError, match="closes no loop at rest"):
         METHODS[spec.axis.method].standstill(spec)
+
+
+NO_FRICTION = [*both(coulomb="0 N", static="0 N"), "drive.command_step=0 V", "method.velocity_integral=0 V/m"]
+
+
+def edged(*overrides: str) -> CascadeEnsemble:
+    return CascadeEnsemble(axis(RIGID, [*NO_FRICTION, "encoder.resolution=10 um", *overrides]).spec)
+
+
+@pytest.mark.parametrize(("time", "swing", "frequency"), [("0.3 ms", 0.157, 333.3), ("1 ms", 0.187, 200.0)])
+def test_a_cycle_across_the_edge_of_a_count_is_forecast(time, swing, frequency):
+    (found,) = edged(f"encoder.velocity_filter={time}").forecasts
+    assert found.kind == "count edge"
+    assert found.swing == pytest.approx(swing * 10e-6, rel=1e-2)
+    assert 1.0 / found.period == pytest.approx(frequency, rel=1e-3)
+
+
+def test_friction_holds_what_is_weaker_than_the_command_of_a_count():
+    held = 0.5 * 175.93 * edged().forecasts[0].command  # force that it costs [N]
+    beyond, within = (both(coulomb=f"{share * held:.6g} N", static=f"{share * held:.6g} N") for share in (1.01, 0.99))
+    assert not edged(*beyond).forecasts
+    assert len(edged(*within).forecasts) == 1
+    assert not edged("encoder.resolution=0 um").forecasts
+    assert not edged("encoder.resolution=100 um").forecasts  # the command is at its limit
+
+
+def test_a_loop_beyond_its_margin_swings_as_far_as_its_limit_lets_it():
+    (found,) = CascadeEnsemble(example("method.velocity_gain=600 V*s/m").spec).forecasts
+    assert found.kind == "beyond the margin"
+    assert 1.0 / found.period == pytest.approx(404, rel=1e-2)
+    assert 12e-6 < found.swing < 26e-6
+    assert found.command == pytest.approx(2 * 600 / 175.93, rel=1e-3)
+    assert [one.kind for one in CascadeEnsemble(example().spec).forecasts] == ["count edge"]  # it flickers so
