@@ -1,5 +1,6 @@
 """Numbered tests of the firmware specification, as far as it is built: four methods, on this computer and emulated."""
 
+import ctypes
 import os
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 import detent
 from detent.export.code import FLAGS, WARNINGS
 from detent.export.teeth import mutants, reach
+from detent.export.unit import unit_named
 from detent.export.verify import TARGETS, verify
 from detent.export.write import export_firmware, read_manifest
 
@@ -248,3 +250,29 @@ def test_15_mutants_are_found(exported, method):
     assert len(found) == 100
     missed = [one for one in found if not one.found]
     assert len(missed) <= 15, missed
+
+
+BARS_27 = {"cascade": 1700, "filtered_servo": 160, "phase_servo": 170, "rotary_table": 200}  # of memory [byte]
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("method", JOBS)
+def test_27_memory_and_stack_on_a_cortex_m4(exported, method):
+    needs("cortex-m4")
+    folder = exported(method)
+    (one,) = verify(folder, ["cortex-m4"])
+    manifest = read_manifest(folder)
+    unit = unit_named(manifest["method"], manifest["name"])
+    assert one.sizes.memory == ctypes.sizeof(unit.controller) + ctypes.sizeof(unit.lines)
+    # The figures of the specification are of units without protection and without lines. Of the rotary table it counts
+    # the positioner alone: interrupts, task and composition of the angle are the unit's by now, too.
+    blocks = {name: field.block for name, field in unit.controller.__fields__.items() if field.block}
+    protection = sum(ctypes.sizeof(blocks[name]) for name in ("guard", "supervision") if name in blocks)
+    bare = ctypes.sizeof(unit.controller) - protection
+    bare = ctypes.sizeof(blocks["positioner"]) if "positioner" in blocks else bare
+    assert 0.5 * BARS_27[method] <= bare <= BARS_27[method]
+    assert one.sizes.written == 0
+    stack = one.sizes.stack[f"{manifest['name']}_control"]
+    assert stack == max(one.sizes.stack.values())
+    assert 50 <= stack <= 260
+    assert "memcpy" in one.sizes.library

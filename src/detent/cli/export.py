@@ -116,7 +116,7 @@ def verify(
                 if not one.found:
                     tell(f"  line {one.line}, {one.becomes} not found: {one.text}")
         for one in proofs:
-            size = f", {one.flash} bytes of flash" if one.equal and one.level == "-Os" else ""
+            size = _sizes(one.sizes) if one.equal and one.level == "-Os" else ""
             said = f"equal, hash {one.told}{size}" if one.equal else one.told
             say(f"{one.target:<11} {one.level.split()[0] if one.level else '':<4} {said}", wrong=not one.equal)
         for text in other:
@@ -127,3 +127,9 @@ def verify(
             say("nothing was run: no compiler is installed", wrong=True)
     if not done:
         raise typer.Exit(NOT_DONE)
+
+
+def _sizes(one: Any) -> str:
+    """What a build takes."""
+    stack = f", {max(one.stack.values())} of stack" if one.stack else ""
+    return f", {one.flash} bytes of flash, {one.parameters} of parameters, {one.memory} of memory{stack}"

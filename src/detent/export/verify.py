@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from detent.axis import Axis
 from detent.errors import DetentError, InputError
 from detent.export.code import FLAGS, WARNINGS, short_hash, template
 from detent.export.drawn import Chance, Row
+from detent.export.sizes import Sizes, sizes_of
 from detent.export.unit import unit_named
 from detent.export.write import MANIFEST, changed_files, export_firmware, read_manifest
 
@@ -92,8 +93,7 @@ class Proof:
     level: str
     equal: bool
     told: str  # the hash, or what differs
-    flash: int = 0  # code and constants of the unit, without parameters and the compiler's library [byte]
-    written: int = 0  # of .data and .bss: 0 [byte]
+    sizes: Sizes = field(default_factory=Sizes)
 
 
 def verify(
@@ -145,7 +145,8 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
     name, source = manifest["name"], folder.resolve()
     with tempfile.TemporaryDirectory() as made:
         work = Path(made)
-        strict = f"{target.compiler} {FLAGS} {level} {target.flags} {WARNINGS} -Werror -I{source} -c"
+        graph = "-fcallgraph-info=su" if target.compiler.endswith("gcc") else ""
+        strict = f"{target.compiler} {FLAGS} {level} {target.flags} {WARNINGS} {graph} -Werror -I{source} -c"
         told = _run([*strict.split(), str(source / f"{name}.c"), "-o", "unit.o"], work)
         compiling = f"{target.compiler} {FLAGS} {level} {target.flags} -DSHARE={target.share} -I{source} -c".split()
         files = {f"{part}.o": (f"{name}_{part}.c", "") for part in ("params", "image", "replay", "drawn")}
@@ -160,12 +161,13 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
             told = told or _run(_linking(work, target, level, program, objects), work)
         if told:
             return Proof(target.name, level, equal=False, told=f"does not compile: {told}")
-        flash, written = _sizes(target, work)
+        entries = [row.split(",")[0] for row in (source / "trace.csv").read_text(encoding="utf-8").splitlines()[1:]]
+        sizes = sizes_of(target.compiler.removesuffix("gcc") if target.emulator else "", work, entries)
         drawn = _answer(target, work, source, "drawn").splitlines()
         job = _answer(target, work, source, "job").splitlines()
     told = [told_of_drawn(folder, manifest, drawn)] if not any(one.startswith("drawn equal ") for one in drawn) else []
     told += [told_of(folder, job)] if f"equal {manifest['ticks']} {manifest['hash']}" not in job else []
-    return Proof(target.name, level, not told, "; job ".join(told) or manifest["hash"], flash, written)
+    return Proof(target.name, level, not told, "; job ".join(told) or manifest["hash"], sizes)
 
 
 def _linking(work: Path, target: Target, level: str, program: str, objects: Sequence[str]) -> list[str]:
@@ -197,17 +199,6 @@ def _answer(target: Target, work: Path, source: Path, program: str) -> str:
     except subprocess.TimeoutExpired:
         return f"no answer within {TIMEOUT:g} s"
     return done.stdout + done.stderr
-
-
-def _sizes(target: Target, work: Path) -> tuple[int, int]:
-    """Bytes of the unit: what stands in flash, and what is written."""
-    tool = target.compiler.replace("gcc", "size") if target.emulator else "size"
-    done = subprocess.run([tool, "unit.o"], cwd=work, capture_output=True, text=True, check=False)  # noqa: S603 - as above
-    lines = done.stdout.splitlines()
-    if done.returncode or len(lines) < 2:
-        return 0, 0
-    text, data, bss = (int(word) for word in lines[1].split()[:3])
-    return text, data + bss
 
 
 def told_of(folder: Path, lines: Sequence[str]) -> str:
