@@ -276,3 +276,29 @@ def test_27_memory_and_stack_on_a_cortex_m4(exported, method):
     assert stack == max(one.sizes.stack.values())
     assert 50 <= stack <= 260
     assert "memcpy" in one.sizes.library
+
+
+def test_22_three_axes_in_one_program_keep_to_themselves(exported, tmp_path):
+    needs("host-gcc")
+    made = [copied(exported(method), tmp_path / method) for method in ("cascade", "phase_servo", "rotary_table")]
+    program, objects = "#include <stdio.h>\nstatic FILE *vectors;\n", []
+    for place, name in made:
+        for file in sources(name)[:-1]:
+            done = run(f"gcc {FLAGS} -O1 -c {file} -o {file}.o", place)
+            assert done.returncode == 0, done.stderr
+            objects.append(str(place / f"{file}.o"))
+        program += (
+            f"int {name}_get(void);\nvoid {name}_put(char one);\nint {name}_replay(void);\n"
+            f"int {name}_get(void) {{ return getc(vectors); }}\nvoid {name}_put(char one) {{ putchar(one); }}\n"
+        )
+    calls = [
+        f'vectors = fopen("{place}/vectors/job.vec", "rb"); result |= {name}_replay(); fclose(vectors);'
+        for place, name in made
+    ]
+    (tmp_path / "all.c").write_text(f"{program}int main(void) {{ int result = 0; {' '.join(calls)} return result; }}\n")
+    linked = run(f"gcc {FLAGS} all.c", tmp_path, *objects, "-o", "all", "-lm")
+    assert linked.returncode == 0, linked.stderr
+    done = run("./all", tmp_path)
+    wanted = [read_manifest(place) for place, _ in made]
+    assert done.stdout.splitlines() == [f"equal {one['ticks']} {one['hash']}" for one in wanted]
+    assert done.returncode == 0
