@@ -13,9 +13,13 @@ from detent.cli.terminal import print_json, progress_bar, say, split_names, tell
 OUTPUT = "Folder for the export: a new one, an empty one, or that of an earlier export."
 PREFIX = "Prefix of all names in C. Default: from the name of the axis."
 TICKS = "Ticks of the golden run at most."
+FILES = "Random register files that each function is called on."
+ROUNDS = "Ticks in which the host does anything and the lines show anything."
 ON = (
     "Where to replay, comma-separated: host-gcc, host-clang, cortex-m0, cortex-m4, cortex-m7, rv32. Default: all there."
 )
+MUTANTS = "Change one thing of the C at so many places, one at a time, and tell which changes no vector finds."
+BAR = "Tell what the vectors do not reach; fail where they take fewer of the branch outcomes [%]."
 AGAINST = "Axis file: make the export anew, with --job as then, and compare."
 
 
@@ -33,6 +37,8 @@ def export(
     job: Job = None,
     prefix: Annotated[str, option("--prefix", "NAME", PREFIX)] = "",
     ticks: Annotated[int, option("--ticks", "NUMBER", TICKS)] = 1_000_000,
+    files: Annotated[int, option("--files", "NUMBER", FILES)] = 1000,
+    rounds: Annotated[int, option("--rounds", "NUMBER", ROUNDS)] = 1_000_000,
     overrides: Set = None,
     *,
     as_json: Json = False,
@@ -48,7 +54,7 @@ def export(
     axis = load(file, overrides or [])
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "simulating the job, translating the controller")
-        made = export_firmware(axis, output, job=job, prefix=prefix, ticks=ticks)
+        made = export_firmware(axis, output, job=job, prefix=prefix, ticks=ticks, files=files, rounds=rounds)
     found: dict[str, Any] = dict(made.manifest)
     if as_json:
         print_json(found | {"folder": str(made.folder)})
@@ -56,6 +62,7 @@ def export(
     unproven = found["not proven"]
     say(f"{axis.name}: {found['functions']} functions in {made.folder / made.name}.c", "bold green")
     tell(f"golden run: {found['job']}, {found['ticks']} ticks, hash {found['hash']}")
+    tell(f"random vectors: {files} register files for each function, {rounds} ticks of misuse")
     tell(f"options folded: {', '.join(f'{key} = {value}' for key, value in found['options'].items()) or 'none'}")
     tell(f"not proven: {', '.join(f'{len(rows)} {what}' for what, rows in unproven.items())}; see manifest.json")
     tell(f"next: detent verify {made.folder}")
@@ -66,6 +73,8 @@ def verify(
     folder: Annotated[Path, typer.Argument(help="What `detent export firmware` wrote.", show_default=False)],
     on: Annotated[list[str] | None, option("--on", "NAMES", ON)] = None,
     against: Annotated[Path | None, option("--against", "FILE", AGAINST)] = None,
+    mutants: Annotated[int, option("--mutants", "NUMBER", MUTANTS)] = 0,
+    coverage_bar: Annotated[float | None, option("--coverage-bar", "PERCENT", BAR)] = None,
     job: Job = None,
     overrides: Set = None,
     *,
@@ -73,22 +82,41 @@ def verify(
 ) -> None:
     """Compile an export, replay its vectors here and on emulated processors, and compare all registers every tick.
 
-    Exit status: 0 all equal, 1 something differs or is not installed, 2 wrong input.
+    Exit status: 0 all equal, 1 something differs, a bar is missed or a tool is not installed, 2 wrong input.
     """
     from detent.axis import load
+    from detent.export import teeth
     from detent.export import verify as proving
 
     with progress_bar(quiet=as_json) as progress:
         axis = load(against, overrides or []) if against is not None else None
         other = list(proving.differences(folder, axis, job)) if axis is not None else []
         proofs = proving.verify(folder, split_names(on), progress)
+        reach = teeth.reach(folder) if coverage_bar is not None else None
+        changed = teeth.mutants(folder, mutants, progress) if mutants else []
     left_out = {} if on else {one.name: one.missing for one in proving.TARGETS.values() if one.missing}
     done = bool(proofs) and all(one.equal for one in proofs) and not other
+    done = done and (reach is None or reach.share >= (coverage_bar or 0.0))
     if as_json:
-        print_json({"equal": done, "proofs": [asdict(p) for p in proofs], "differences": other, "not run": left_out})
+        print_json({
+            "equal": done, "proofs": [asdict(p) for p in proofs], "differences": other, "not run": left_out,
+            "reach": asdict(reach) | {"share": reach.share} if reach else None, "mutants": [asdict(m) for m in changed],
+        })  # fmt: skip
     else:
+        if reach is not None:
+            say(
+                f"branch outcomes taken: {reach.share:.1f} % of {reach.outcomes}",
+                wrong=reach.share < (coverage_bar or 0.0),
+            )
+            for one in reach.missed:
+                tell(f"  line {one.line}, way {one.way} never taken: {one.text}")
+        if changed:
+            tell(f"mutants found: {sum(bool(one.found) for one in changed)} of {len(changed)}")
+            for one in changed:
+                if not one.found:
+                    tell(f"  line {one.line}, {one.becomes} not found: {one.text}")
         for one in proofs:
-            size = f", {one.flash} bytes of flash" if one.equal and one.level == "-Os" else ""
+            size = _sizes(one.sizes) if one.equal and one.level == "-Os" else ""
             said = f"equal, hash {one.told}{size}" if one.equal else one.told
             say(f"{one.target:<11} {one.level.split()[0] if one.level else '':<4} {said}", wrong=not one.equal)
         for text in other:
@@ -99,3 +127,9 @@ def verify(
             say("nothing was run: no compiler is installed", wrong=True)
     if not done:
         raise typer.Exit(NOT_DONE)
+
+
+def _sizes(one: Any) -> str:
+    """What a build takes."""
+    stack = f", {max(one.stack.values())} of stack" if one.stack else ""
+    return f", {one.flash} bytes of flash, {one.parameters} of parameters, {one.memory} of memory{stack}"

@@ -29,7 +29,7 @@ class EndlessAngleParams(Registers):
     patent, which adds one period in the direction of the jog after any crossing; or, as a conventional unit, none.
     """
 
-    period: i8 = register("range of the detected angle T", unit="count")
+    period: i8 = register("range of the detected angle T", unit="count", range=(1, 1 << 40))
     form: u1 = register("0 turn counter, 1 flag as in the patent, 2 raw: no extension", unit="code", option=True)
 
 

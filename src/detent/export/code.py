@@ -13,9 +13,10 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 
 from detent import __version__
-from detent.export.translate.program import Program
+from detent.export.drawn import FAR, PLACES, SEED, Chance, Row, drawn_from
+from detent.export.translate.program import Function, Program
 from detent.export.translate.text import code_text, comment_of, signals_text, struct_texts
-from detent.export.translate.values import c_field, number
+from detent.export.translate.values import c_field, interval_of, number, type_of_local
 from detent.export.unit import LARGE, ControlUnit, members, ranged
 from detent.export.vectors import Golden
 from detent.kernel.registers import Field, Leaf, Registers, Width
@@ -224,6 +225,78 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
     made["trace.csv"] = table(traced(program, made[f"{name}.c"]))
     made["build.mk"] = f"{name}_CFLAGS := {FLAGS}\n{name}_SOURCES := {name}.c {name}_params.c\n"
     return made
+
+
+# ---- random vectors
+
+
+def _row_in_c(row: Row) -> dict[str, Any]:
+    place = f"{row.root}_." + ".".join(c_field(part) for part in row.path.split(".")) + ("[0]" if row.length else "")
+    numbers = {key: number(getattr(row, key)).text for key in ("lo", "hi", "span", "low", "high", "given")}
+    return numbers | {"place": place, "length": row.length, "bytes": row.width.size, "real": int(row.width.is_float)}
+
+
+def _call_in_c(chance: Chance, f: Function) -> list[str]:
+    """Statements that draw the arguments of a function, call it, and return the bits of its result."""
+    program, lines, told, signals = chance.program, list[str](), list[str](), 0
+    for k, name in enumerate(f.parameters):
+        value: Any = f.names[name]
+        if value.kind == "file":
+            kind = ("const " if value.registers in program.fixed else "") + program.struct(value.registers)
+            found = [f"&{root}_" + "".join(f".{c_field(one)}" for one in path.split(".") if one)
+                     for root, path in chance.places[value.registers]]  # fmt: skip
+            lines.append(f"{kind} *const places{k}[{len(found)}] = {{{', '.join(found)}}};")
+            lines.append(f"{kind} *const a{k} = places{k}[draw() % {len(found)}];")
+        elif value.kind == "signal":
+            code = value.width.code
+            lines.append(f"const {program.name}_{code}_signal a{k} = lay_{code}(laid_{code}_{signals}_);")
+            signals += 1
+        elif value.kind == "bool":
+            lines.append(f"const bool a{k} = (draw() & 1) == 1;")
+        elif value.kind == "float":
+            lines.append(f"const double a{k} = draw_real({-FAR}, {FAR}, 0.0);")
+            told.append(f"real_bits(a{k})")
+        else:
+            lo, hi = drawn_from(value.lo, value.hi)
+            least, most, count = (number(one).text for one in (lo, hi, hi - lo + 1))
+            kind = value.ctype if f.entry else type_of_local(value)
+            lines.append(f"const {kind} a{k} = ({kind})draw_whole({least}, {most}, {count});")
+            told.append(f"(uint64_t)a{k}")
+    lines += [f"told_[{k}] = {one};" for k, one in enumerate(told)] + [f"arguments_ = {len(told)};"]
+    call = f"{f.cname}({', '.join(f'a{k}' for k in range(len(f.parameters)))})"
+    forms = {"int": "return (uint64_t){};", "bool": "return {} ? 1u : 0u;", "float": "return real_bits({});"}
+    return [*lines, *forms.get(f.result_kind, "(void){};\nreturn 0;").format(call).splitlines()]
+
+
+def drawn_text(chance: Chance) -> str:
+    """The program that draws what `chance` draws, in C."""
+    program, name = chance.program, chance.unit.name
+    laid: dict[str, dict[str, str]] = {}
+    for f in program.order:
+        found = [value for value in f.names.values() if value is not None and value.kind == "signal" and value.width]
+        for k, width in enumerate(value.width for value in found if value.width):
+            label = f"laid_{width.code}_{k}_"
+            laid[label] = {"name": label, "code": width.code, "ctype": width.c_name}
+    feed = [f"laid_{value.width.code}_{k}_" for k, value in enumerate(chance.signals) if value.width]
+    widths = {value.width for f in program.order for value in f.names.values() if value and value.kind == "signal"}
+    kinds = [
+        {"code": one.code, "ctype": one.c_name, "lo": interval_of(one)[0], "hi": interval_of(one)[1]}
+        for one in sorted((one for one in widths if one), key=lambda one: one.code)
+    ]
+    roots = {chance.unit.params: "&p_", chance.unit.controller: "&c_", chance.unit.lines: "&l_"}
+    values: list[Any] = [chance.tick.names[one] for one in chance.tick.parameters]
+    given = [roots[value.registers] for value in values if value.kind == "file"]
+    given += [f"feed{k}_" for k in range(len(feed))]
+    functions = [{"name": f.cname, "lines": _call_in_c(chance, f)} for f in program.order]
+    rows = {"parameters": chance.rows["p"], "controller": chance.rows["c"], "lines": chance.rows["l"]}
+    rows |= {"wires": chance.wires}
+    return template(
+        "drawn.c.in", name=name, NAME=name.upper(), most=PLACES, seed=SEED, large=LARGE, functions=functions,
+        told=max(1, *(len(f.parameters) for f in program.order)), laid=list(laid.values()), kinds=kinds,
+        feed=[laid[one] for one in feed], tick=f"{chance.tick.cname}({', '.join(given)})",
+        actions=[program.order.index(one) for one in chance.actions],
+        **{key: [_row_in_c(row) for row in found] for key, found in rows.items()},
+    )  # fmt: skip
 
 
 def _tick_of(unit: ControlUnit) -> Any:

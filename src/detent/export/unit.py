@@ -96,11 +96,21 @@ def unit_of(axis: Axis, prefix: str = "") -> ControlUnit:
     name = name if prefix or not name[0].isdigit() else f"axis_{name}"
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or name in C_WORDS:
         raise RefusedError("FW13", None, f"the prefix {name!r}", "a name in C", "name another with --prefix")
+    return _unit(method, name)
+
+
+def unit_named(method: str, name: str) -> ControlUnit | None:
+    """The control unit of a method with this prefix; None where the method is not there, or has none."""
+    found = METHODS.get(method)
+    return _unit(found, name) if found is not None and found.actions else None
+
+
+def _unit(method: Any, name: str) -> ControlUnit:
     params = method.parameters().__fields__["controller"].block
     state = method.registers().__fields__
     controller, lines = state["controller"].block, state["lines"].block
     if params is None or controller is None or lines is None:
-        raise DetentError(f"{axis.name}: the method {method.name} has no controller of its own; name another axis")
+        raise DetentError(f"the method {method.name} has no controller of its own; name another axis")
     steps = {f"{name}_control": control_of(params)}
     steps |= {f"{name}_{action}": method.brought(f"controller:{action}") for action in method.actions}
     return ControlUnit(name, params, controller, lines, steps)

@@ -4,19 +4,25 @@ On this computer by its compilers, at three levels of optimisation and once wher
 processors that qemu emulates. Compilers and emulators are found on the path; what is not installed is said.
 """
 
+import ctypes
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from detent.axis import Axis
 from detent.errors import DetentError, InputError
-from detent.export.code import FLAGS, WARNINGS, template
+from detent.export.code import FLAGS, WARNINGS, short_hash, template
+from detent.export.drawn import Chance, Row
+from detent.export.sizes import Sizes, sizes_of
+from detent.export.unit import unit_named
 from detent.export.write import MANIFEST, changed_files, export_firmware, read_manifest
 
 TIMEOUT = 600.0  # of one replay [s]
+TOLD = 20  # registers that are told of a difference
 TRAPS = "-O1 -g -fsanitize=undefined,address -fno-sanitize-recover=all -DFIRMWARE_CHECK"
 ARM = "-mthumb -ffreestanding -nostartfiles"
 SMALL = {"code": "0x00000000", "code_length": "4M", "data": "0x20000000", "data_length": "4M"}
@@ -37,6 +43,7 @@ class Target:
     emulator_package: str = ""
     memory: dict[str, str] | None = None  # of an emulated board
     libraries: str = "-lm"
+    share: int = 1  # of the random calls and ticks one in so many is done
 
     @property
     def missing(self) -> str:
@@ -56,7 +63,7 @@ def _cortex(name: str, flags: str, board: str) -> Target:
     return Target(
         name, "arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi", f"{ARM} -mcpu={flags}",
         emulator="qemu-system-arm", machine=f"-M {board}", emulator_package="qemu-system-arm", memory=SMALL,
-        libraries="-nostdlib -lm -lc -lgcc",
+        libraries="-nostdlib -lm -lc -lgcc", share=10,
     )  # fmt: skip
 
 
@@ -72,7 +79,7 @@ TARGETS = {
             "rv32", "riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf",
             "--specs=picolibc.specs -march=rv32imac -mabi=ilp32 -ffreestanding -nostartfiles",
             emulator="qemu-system-riscv32", machine="-M virt -bios none", emulator_package="qemu-system-misc",
-            memory=LARGE, libraries="-nostdlib -lm -lc -lgcc",
+            memory=LARGE, libraries="-nostdlib -lm -lc -lgcc", share=10,
         ),
     )
 }  # fmt: skip
@@ -86,8 +93,7 @@ class Proof:
     level: str
     equal: bool
     told: str  # the hash, or what differs
-    flash: int = 0  # code and constants of the unit, without parameters and the compiler's library [byte]
-    written: int = 0  # of .data and .bss: 0 [byte]
+    sizes: Sizes = field(default_factory=Sizes)
 
 
 def verify(
@@ -139,38 +145,38 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
     name, source = manifest["name"], folder.resolve()
     with tempfile.TemporaryDirectory() as made:
         work = Path(made)
-        strict = f"{target.compiler} {FLAGS} {level} {target.flags} {WARNINGS} -Werror -I{source} -c"
+        graph = "-fcallgraph-info=su" if target.compiler.endswith("gcc") else ""
+        strict = f"{target.compiler} {FLAGS} {level} {target.flags} {WARNINGS} {graph} -Werror -I{source} -c"
         told = _run([*strict.split(), str(source / f"{name}.c"), "-o", "unit.o"], work)
-        for file in (f"{name}_params.c", f"{name}_image.c", f"{name}_replay.c", "board.c"):
-            vectors = f'-DVECTORS="{source / "vectors/job.vec"}"'
-            command = f"{target.compiler} {FLAGS} {level} {target.flags} -I{source} -c".split()
-            told = told or _run([*command, vectors, str(source / file), "-o", f"{file}.o"], work)
-        told = told or _run(_linking(work, target, level), work)
+        compiling = f"{target.compiler} {FLAGS} {level} {target.flags} -DSHARE={target.share} -I{source} -c".split()
+        files = {f"{part}.o": (f"{name}_{part}.c", "") for part in ("params", "image", "replay", "drawn")}
+        files |= {f"board_{kind}.o": ("board.c", f"vectors/{kind}.vec") for kind in ("job", "drawn")}
+        for made_file, (file, vectors) in files.items():
+            more = [f'-DVECTORS="{source / vectors}"'] if vectors else []
+            told = told or _run([*compiling, *more, str(source / file), "-o", made_file], work)
+        # The program of the random vectors holds the unit's own text, and sees its inner functions.
+        programs = {"job": ("unit", "replay"), "drawn": ("drawn",)}
+        for program, parts in programs.items():
+            objects = [f"{part}.o" for part in (*parts, "params", "image", f"board_{program}")]
+            told = told or _run(_linking(work, target, level, program, objects), work)
         if told:
             return Proof(target.name, level, equal=False, told=f"does not compile: {told}")
-        flash, written = _sizes(target, work)
-        text = _answer(target, work, source)
-    lines = text.splitlines()
-    equal = f"equal {manifest['ticks']} {manifest['hash']}" in lines
-    return Proof(target.name, level, equal, manifest["hash"] if equal else told_of(folder, lines), flash, written)
+        entries = [row.split(",")[0] for row in (source / "trace.csv").read_text(encoding="utf-8").splitlines()[1:]]
+        sizes = sizes_of(target.compiler.removesuffix("gcc") if target.emulator else "", work, entries)
+        drawn = _answer(target, work, source, "drawn").splitlines()
+        job = _answer(target, work, source, "job").splitlines()
+    told = [told_of_drawn(folder, manifest, drawn)] if not any(one.startswith("drawn equal ") for one in drawn) else []
+    told += [told_of(folder, job)] if f"equal {manifest['ticks']} {manifest['hash']}" not in job else []
+    return Proof(target.name, level, not told, "; job ".join(told) or manifest["hash"], sizes)
 
 
-def _linking(work: Path, target: Target, level: str) -> list[str]:
+def _linking(work: Path, target: Target, level: str, program: str, objects: Sequence[str]) -> list[str]:
     more: list[str] = []
     if target.memory is not None:
         (work / "board.ld").write_text(template("board.ld.in", **target.memory), encoding="utf-8")
         more = ["-T", "board.ld", "-Wl,-e," + ("entry_" if target.name == "rv32" else "Start")]
-    objects = sorted(one.name for one in work.glob("*.o"))
-    return [
-        target.compiler,
-        *level.split(),
-        *target.flags.split(),
-        *more,
-        *objects,
-        "-o",
-        "unit",
-        *target.libraries.split(),
-    ]
+    command = [target.compiler, *level.split(), *target.flags.split(), *more]
+    return [*command, *objects, "-o", program, *target.libraries.split()]
 
 
 def _run(command: list[str], work: Path) -> str:
@@ -179,12 +185,12 @@ def _run(command: list[str], work: Path) -> str:
     return "" if done.returncode == 0 else (done.stderr or done.stdout or "no word").strip().splitlines()[0]
 
 
-def _answer(target: Target, work: Path, source: Path) -> str:
-    """What the replay says."""
-    command = ["./unit", str(source / "vectors/job.vec")]
+def _answer(target: Target, work: Path, source: Path, program: str) -> str:
+    """What a replay says."""
+    command = [f"./{program}", str(source / f"vectors/{program}.vec")]
     if target.emulator:
-        rest = "-nographic -monitor none -serial none -semihosting-config enable=on,target=native -kernel unit"
-        command = [target.emulator, *target.machine.split(), *rest.split()]
+        rest = "-nographic -monitor none -serial none -semihosting-config enable=on,target=native"
+        command = [target.emulator, *target.machine.split(), *rest.split(), "-kernel", program]
     try:
         done = subprocess.run(  # noqa: S603 - found on the path
             command, cwd=work, capture_output=True, text=True, errors="replace", check=False, timeout=TIMEOUT,
@@ -193,17 +199,6 @@ def _answer(target: Target, work: Path, source: Path) -> str:
     except subprocess.TimeoutExpired:
         return f"no answer within {TIMEOUT:g} s"
     return done.stdout + done.stderr
-
-
-def _sizes(target: Target, work: Path) -> tuple[int, int]:
-    """Bytes of the unit: what stands in flash, and what is written."""
-    tool = target.compiler.replace("gcc", "size") if target.emulator else "size"
-    done = subprocess.run([tool, "unit.o"], cwd=work, capture_output=True, text=True, check=False)  # noqa: S603 - as above
-    lines = done.stdout.splitlines()
-    if done.returncode or len(lines) < 2:
-        return 0, 0
-    text, data, bss = (int(word) for word in lines[1].split()[:3])
-    return text, data + bss
 
 
 def told_of(folder: Path, lines: Sequence[str]) -> str:
@@ -220,6 +215,53 @@ def told_of(folder: Path, lines: Sequence[str]) -> str:
     if not tick:
         return " ".join(lines[-3:]) or "no answer"
     return f"differs in tick {tick}: {'; '.join(found) or 'the hash alone'}"
+
+
+def chance_of(folder: Path, manifest: Mapping[str, Any]) -> Chance | None:
+    """What the random vectors of an export were drawn from; None where the steps are others by now."""
+    unit = unit_named(manifest["method"], manifest["name"])
+    data = (folder / "vectors/params.bin").read_bytes()
+    if unit is None or len(data) != ctypes.sizeof(unit.params):
+        return None
+    params = unit.params.from_buffer_copy(data)
+    program = unit.translated(params)
+    steps = {f"{one.place.rpartition(':')[0]} {one.py.__qualname__}": one.source for one in program.order}
+    hashes = {name: short_hash(source.encode()) for name, source in steps.items()}
+    return Chance(unit, program, params) if hashes == _steps(folder) else None
+
+
+def told_of_drawn(folder: Path, manifest: Mapping[str, Any], lines: Sequence[str]) -> str:
+    """Where random vectors differ, for people: function, call, its arguments, and registers by their names."""
+    words = [line.split() for line in lines]
+    number, at = next(((int(one[1]), int(one[2])) for one in words if one[:1] == ["drawn"] and len(one) == 3), (-1, 0))
+    chance = chance_of(folder, manifest) if number >= 0 else None
+    if chance is None:
+        return f"differs in call {at} of function {number}" if number >= 0 else " ".join(lines[-3:]) or "no answer"
+    chance.run(number, at)
+    if number < len(chance.program.order):
+        f = chance.program.order[number]
+        told = ", ".join(f"{name} {one}" for name, one in zip(f.parameters, chance.told, strict=True) if _is_plain(one))
+        place = f"call {at} of {f.cname}({told})"
+    else:
+        place = f"tick {at} of misuse"
+    found: list[str] = []
+    for _, root, row, k, got in (one for one in words if one[:1] == ["state"] and len(one) == 5):
+        name = ("c", "l")[int(root)]
+        register = chance.rows[name][int(row)]
+        wanted = chance.bits(register, int(k))
+        if wanted != int(got):
+            full = {"c": "controller", "l": "lines"}[name]
+            found.append(f"{full}.{register.path}[{k}] {_value(register, int(got))} for {_value(register, wanted)}")
+    return f"differs in {place}: {'; '.join(found[:TOLD]) or 'its result'}"
+
+
+def _is_plain(one: Any) -> bool:
+    return isinstance(one, int | float)
+
+
+def _value(row: Row, bits: int) -> str:
+    """What these bits are in a register."""
+    return repr(row.width.ctype.from_buffer_copy(bits.to_bytes(row.width.size, "little")).value)
 
 
 def differences(folder: str | Path, axis: Axis, job: str | Path | None = None) -> Iterator[str]:
@@ -245,7 +287,12 @@ def differences(folder: str | Path, axis: Axis, job: str | Path | None = None) -
         raise InputError.of_file(str(place), f"a folder without {MANIFEST}", "an export", "detent export firmware")
     with tempfile.TemporaryDirectory() as made:
         new = export_firmware(
-            axis, Path(made) / "new", job=job, prefix=manifest["name"], ticks=max(1, int(manifest["ticks"]))
+            axis,
+            Path(made) / "new",
+            job=job,
+            prefix=manifest["name"],
+            ticks=max(1, int(manifest["ticks"])),
+            **manifest["drawn"],
         )
         before, after = (_steps(one) for one in (place, new.folder))
         for step in sorted(before.keys() | after.keys()):

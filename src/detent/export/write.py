@@ -11,7 +11,8 @@ from typing import Any, cast
 from detent import __version__
 from detent.axis import Axis
 from detent.errors import DetentError, InputError
-from detent.export.code import FLAGS, as_json, seconds, texts
+from detent.export.code import FLAGS, as_json, drawn_text, seconds, texts
+from detent.export.drawn import FILES, ROUNDS, Chance, drawn_vectors
 from detent.export.translate.program import Program
 from detent.export.translate.values import RefusedError
 from detent.export.unit import options_of, outside_ranges, unit_of
@@ -31,8 +32,15 @@ class Exported:
     manifest: Mapping[str, Any]
 
 
-def export_firmware(
-    axis: Axis, folder: str | Path, *, job: str | Path | None = None, prefix: str = "", ticks: int = TICKS
+def export_firmware(  # noqa: PLR0913 - an axis, and what its vectors are made of
+    axis: Axis,
+    folder: str | Path,
+    *,
+    job: str | Path | None = None,
+    prefix: str = "",
+    ticks: int = TICKS,
+    files: int = FILES,
+    rounds: int = ROUNDS,
 ) -> Exported:
     """Write the controller of an axis as C99, with golden vectors of a job.
 
@@ -48,6 +56,10 @@ def export_firmware(
         Of all names in C; default: from the name of the axis.
     ticks : int
         Ticks of the golden run at most, 1 or more.
+    files : int
+        Random register files that each function is called on, 0 for none.
+    rounds : int
+        Ticks in which the host does anything and the lines show anything, 0 for none.
 
     Returns
     -------
@@ -64,6 +76,9 @@ def export_firmware(
     target = Path(folder)
     if ticks < 1:
         raise DetentError(f"--ticks: got {ticks}; expected: 1 or more; try: leave it out for {TICKS}")
+    for option, count in (("--files", files), ("--rounds", rounds)):
+        if count < 0:
+            raise DetentError(f"{option}: got {count}; expected: 0 or more; try: leave it out")
     refuse_other_files(target)
     unit = unit_of(axis, prefix)
     loaded = axis.load_job(job) if job is not None else axis.method.trial_job(axis.spec)
@@ -78,8 +93,13 @@ def export_firmware(
         name: text.encode()
         for name, text in texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)).items()
     }
+    chance = Chance(unit, program, golden.params)
+    made[f"{unit.name}_drawn.c"] = drawn_text(chance).encode()
     made["vectors/job.vec"] = golden.vectors()
+    made["vectors/params.bin"] = bytes(golden.params)
+    made["vectors/drawn.vec"] = drawn_vectors(chance, files, rounds)
     manifest = _manifest(axis, loaded.name, golden, program)
+    manifest["drawn"] = {"files": files, "rounds": rounds}
     made["README.md"] = readme(manifest, unit.name, seconds(axis.simulated.tick)).encode()
     manifest["files"] = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(made.items())}
     made[MANIFEST] = as_json(manifest).encode()

@@ -6,6 +6,7 @@ import pytest
 from tests.unit.test_cli import call
 
 import detent
+from detent.export import teeth
 from detent.export import verify as proving
 
 pytestmark = pytest.mark.compiled
@@ -18,7 +19,9 @@ def in_a_folder(tmp_path, monkeypatch):
 
 
 def export(*more: object):
-    return call("export", "firmware", CASCADE, "--output", "out", "--ticks", "50", *more)
+    return call(
+        "export", "firmware", CASCADE, "--output", "out", "--ticks", "50", "--files", "1", "--rounds", "200", *more
+    )
 
 
 def test_an_export_says_what_it_wrote_and_what_comes_next():
@@ -52,7 +55,8 @@ def test_verify_tells_each_target_and_what_is_not_installed(monkeypatch):
     assert "gone        not run: needs no-such-gcc (Debian: apt install gcc-gone)" in answer.out
     assert call("verify", "out", "--on", "gone").status == 1
     data = call("verify", "out", "--json").data
-    assert data == {"equal": False, "proofs": [], "differences": [], "not run": {"gone": gone.missing}}
+    nothing = {"equal": False, "proofs": [], "differences": [], "not run": {"gone": gone.missing}}
+    assert data == nothing | {"reach": None, "mutants": []}
 
 
 @pytest.mark.process
@@ -64,3 +68,24 @@ def test_verify_replays_here_and_compares_with_the_axis():
     other = call("verify", "out", "--on", "host-gcc", "--against", CASCADE, "--set", "method.position_gain=41")
     assert other.status == 1
     assert "cascade_axis_params.c is another file" in other.out + other.err
+
+
+@pytest.mark.parametrize("missed", [0, 3])
+def test_verify_tells_what_the_vectors_miss_and_fails_below_the_bar(monkeypatch, missed):
+    export()
+    fine = proving.Proof("host-gcc", "-Os", equal=True, told="77")
+    outcomes = tuple(teeth.Outcome(5, "if (a < b) {", way) for way in range(missed))
+    made = [teeth.Mutant(9, "a + b", "-", ""), teeth.Mutant(9, "a < b", "<=", "job")]
+    monkeypatch.setattr(proving, "verify", lambda *_: [fine])
+    monkeypatch.setattr(teeth, "reach", lambda _: teeth.Reach(20, outcomes, 30, ()))
+    monkeypatch.setattr(teeth, "mutants", lambda *_: made)
+    answer = call("verify", "out", "--coverage-bar", "90", "--mutants", "2")
+    assert answer.status == (1 if missed else 0)
+    told = answer.out + answer.err
+    assert f"{100 - 5 * missed:.1f} % of 20" in told
+    assert told.count("never taken: if (a < b) {") == missed
+    assert "mutants found: 1 of 2" in told
+    assert "line 9, - not found: a + b" in told
+    data = call("verify", "out", "--coverage-bar", "90", "--mutants", "2", "--json").data
+    assert data["reach"]["share"] == 100 - 5 * missed
+    assert [one["found"] for one in data["mutants"]] == ["", "job"]

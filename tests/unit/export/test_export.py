@@ -19,6 +19,7 @@ from detent.methods.cascade.controller import CascadeControllerParams
 
 pytestmark = pytest.mark.compiled
 MOST = 2200
+FEW = {"files": 2, "rounds": 300}  # random vectors
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,7 @@ def axis():
 
 @pytest.fixture(scope="module")
 def folder(axis, tmp_path_factory):
-    return export_firmware(axis, tmp_path_factory.mktemp("firmware") / "out", ticks=MOST).folder
+    return export_firmware(axis, tmp_path_factory.mktemp("firmware") / "out", ticks=MOST, **FEW).folder
 
 
 def rows(folder, name) -> list[dict[str, str]]:
@@ -118,7 +119,7 @@ def test_the_hash_is_fnv_1a_over_the_image_of_the_state(axis):
 
 
 def test_the_same_input_gives_the_same_bytes(folder, axis, tmp_path):
-    again = export_firmware(axis, tmp_path / "another name", ticks=MOST).folder
+    again = export_firmware(axis, tmp_path / "another name", ticks=MOST, **FEW).folder
     for name in [*read_manifest(folder)["files"], MANIFEST]:
         assert (again / name).read_bytes() == (folder / name).read_bytes(), name
 
@@ -139,8 +140,8 @@ def test_every_function_is_traced_to_its_step(folder):
 
 def test_an_earlier_export_is_replaced_and_other_files_are_not(axis, tmp_path):
     place = tmp_path / "out"
-    export_firmware(axis, place, ticks=10)
-    export_firmware(axis, place, ticks=20)
+    export_firmware(axis, place, ticks=10, files=0, rounds=0)
+    export_firmware(axis, place, ticks=20, **FEW)
     assert read_manifest(place)["ticks"] == 20
     (place / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match=r"FW14: a folder with mine\.txt") as caught:
@@ -224,7 +225,7 @@ def test_an_edited_step_and_another_axis_are_found(folder, axis, tmp_path):
     told = list(differences(folder, other))
     assert "cascade_axis_params.c is another file" in told
     assert not any("step" in one for one in told)
-    copy = export_firmware(axis, tmp_path / "out", ticks=MOST).folder
+    copy = export_firmware(axis, tmp_path / "out", ticks=MOST, **FEW).folder
     text = (copy / "trace.csv").read_text()
     old = next(row["hash"] for row in rows(copy, "trace.csv") if row["step"] == "limit_command")
     (copy / "trace.csv").write_text(text.replace(old, "0" * 16))
