@@ -3200,3 +3200,23 @@ def test_22_the_panel_homes_and_says_where_it_stands(tmp_path: Path) -> None:
     assert found["told"].startswith("Homed: it stands at ")
     assert 0.018 < found["position"] < 0.025
     assert found["widest"] <= 360
+
+
+@pytest.mark.wide
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", ["rotary_table", "phase_servo", "zoom"])
+def test_21_the_first_motion_is_held_to_a_tenth_of_the_speed(name: str) -> None:
+    """By what each has moved in ten periods, for its sensor counts in steps, and some only every other period."""
+    bench = Bench(name, **({"motor": "group_b"} if name == "zoom" else {}))
+    bench.pass_time(0.7)
+    assert bench.do(ops.ENABLE).how == ops.DONE
+    bench.pass_time(0.7)
+    table, top = name == "rotary_table", bench.host.axis.speed
+    bench.host.ask(*((ops.GO, 3) if table else (ops.MOVE_BY, 4e-3)))
+    seen: list[float] = []
+    while not bench.answer.rests or len(seen) < 50:
+        bench.host.run(1)
+        seen.append(bench.answer.position)
+    ways = np.abs(np.diff(seen))
+    speeds = np.convolve(ways, np.ones(10), "valid") / (10 * bench.loop.period * 1e-9)
+    assert 0.04 * top < max(speeds) <= 0.125 * top

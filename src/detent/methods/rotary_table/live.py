@@ -104,6 +104,8 @@ def serve(  # noqa: PLR0913 - as all of its kind
             set_out(p.positioner, r, round(d.target / q.count), SHORTEST, round(q.speed * d.share * q.dial))
         elif d.do in (RUN, HALT):
             halt(p, c)
+    if d.do == NUMBERED and d.share < 1.0:  # the speed is that of the number, from the look after its start on less
+        r.limit = min(r.limit, round(q.speed * d.share * q.dial))
     place = r.angle.position
     a.position = place * q.count
     a.velocity = (place - memory.position) * q.count / q.seconds
