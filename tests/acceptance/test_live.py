@@ -50,7 +50,7 @@ from tests.live_axes import PAGES, PLAIN, Head, Stepper, longest_stop, moves
 from tests.live_bench import MOVED, OPERATED, Bench
 from tests.live_browser import Script, panelled, run_script, until
 from tests.live_course import COMPILED, COVERED, bound, hunted, under_way
-from tests.live_home import WAYS, Lost, zeros
+from tests.live_home import HOMED, WAYS, Lost, zeros
 from tests.live_panel import PanelRig
 from tests.live_rig import SENSORS, memory_folder, open_store, read
 from tests.places import ROOT
@@ -3117,3 +3117,91 @@ def test_56_a_job_is_led_held_and_stopped_from_terminals(folder: Path, running: 
     assert live_processes.run("connect", file, "job", str(folder / "none.csv")).returncode == 2
     assert live_processes.run("connect", file, "job").returncode == 2
     running.end()
+
+
+# ---- homing of the methods beside the cascade
+
+ZEROS = {
+    "filtered_servo contact": (-4e-6, 4e-6), "filtered_servo switch": (-3e-6, 9e-6),
+    "filtered_servo index": (-9e-6, 3e-6), "phase_servo index": (-14e-6, 14e-6), "zoom switch": (-4e-6, 6e-6),
+}  # fmt: skip
+"""Between what the position lies less the true one after a homing and a move [m]: a pulse of 5 um and the sample of it,
+the two steps within which a phase servo stops, a step of the motor."""
+
+
+def check_homing(case: str, starts: int) -> list[float]:
+    """The same zero from so many starts."""
+    name, way = case.split()
+    lowest, highest = ZEROS[case]
+    found = zeros(way, starts, name)
+    assert len(found) == starts
+    assert lowest < min(found)
+    assert max(found) < highest
+    return found
+
+
+@pytest.mark.wide
+@pytest.mark.compiled
+@pytest.mark.parametrize("case", HOMED)
+def test_22_each_method_finds_the_same_zero(case: str) -> None:
+    check_homing(case, 3)
+
+
+@pytest.mark.long
+@pytest.mark.compiled
+@pytest.mark.parametrize("case", HOMED)
+def test_22_each_method_finds_the_same_zero_from_a_hundred_starts(case: str) -> None:
+    found = check_homing(case, 100)
+    if case != "zoom switch":  # whose steps and rotor stand alike each time
+        assert max(found) > min(found)
+
+
+@pytest.mark.wide
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", ["filtered_servo", "phase_servo", "zoom", "rotary_table", "print_head", "cascade"])
+def test_22_home_is_a_command_of_all_six(name: str) -> None:
+    bench = Bench(name, careful=False, **({"motor": "group_b"} if name == "zoom" else {}))
+    bench.pass_time(0.7)
+    assert bench.do(ops.ENABLE).how == ops.DONE
+    bench.pass_time(0.5)
+    while not bench.answer.rests:
+        bench.pass_time(0.5)
+    bench.operation.trust = ops.NOT_KNOWN
+    assert bench.do(ops.HOME).how == ops.DONE
+    assert bench.operation.trust == ops.REFERENCED
+
+
+@pytest.mark.wide
+@pytest.mark.process
+def test_22_the_panel_homes_and_says_where_it_stands(tmp_path: Path) -> None:
+    """On its view Home: which step is under way, what came of it, and a stop on the way leaves the position unknown."""
+    options = ("--period", "10 ms", "--set", "home.back_off=1 mm", "--set", "home.position=18 mm")
+    with panelled(tmp_path, "filtered_servo.toml", *options) as live:
+        found = run_script("home", live.link())
+    assert found["problems"] == []
+    assert found["stopped"] == ["unknown", "Not homed (aborted)"]
+    assert found["under way"] == "Look for the reference"
+    assert found["trust"] == "referenced"
+    assert found["told"].startswith("Homed: it stands at ")
+    assert 0.018 < found["position"] < 0.025
+    assert found["widest"] <= 360
+
+
+@pytest.mark.wide
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", ["rotary_table", "phase_servo", "zoom"])
+def test_21_the_first_motion_is_held_to_a_tenth_of_the_speed(name: str) -> None:
+    """By what each has moved in ten periods, for its sensor counts in steps, and some only every other period."""
+    bench = Bench(name, **({"motor": "group_b"} if name == "zoom" else {}))
+    bench.pass_time(0.7)
+    assert bench.do(ops.ENABLE).how == ops.DONE
+    bench.pass_time(0.7)
+    table, top = name == "rotary_table", bench.host.axis.speed
+    bench.host.ask(*((ops.GO, 3) if table else (ops.MOVE_BY, 4e-3)))
+    seen: list[float] = []
+    while not bench.answer.rests or len(seen) < 50:
+        bench.host.run(1)
+        seen.append(bench.answer.position)
+    ways = np.abs(np.diff(seen))
+    speeds = np.convolve(ways, np.ones(10), "valid") / (10 * bench.loop.period * 1e-9)
+    assert 0.04 * top < max(speeds) <= 0.125 * top

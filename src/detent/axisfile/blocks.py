@@ -13,6 +13,7 @@ from detent.axisfile.elementwise import is_array, most, nearest, up
 from detent.axisfile.tables import (
     EncoderTable,
     FrictionTables,
+    HomeTable,
     InterferenceTable,
     MotionProtectionTable,
     MotorTable,
@@ -22,14 +23,19 @@ from detent.axisfile.tables import (
     TurnProtectionTable,
 )
 from detent.control.guard import Guard, GuardParams
+from detent.control.homing import HomingParams
 from detent.errors import GUARD_TEXT
 from detent.plant.drive_train import DriveTrainParams, fill_period
 from detent.plant.push import Push
 from detent.sensing.encoder import EncoderParams
+from detent.sensing.home_marks import HomeMarksParams
 from detent.sensing.interference import CORRUPT, INSERT_MINUS, INSERT_PLUS, LOSE_SAMPLE, REMOVE, InterferenceParams
 from detent.units import format_quantity
 
 SUBSTEP_SHARE = 0.25  # longest substep of the power series, as a share of the fastest time constant
+WAYS = "contact", "switch", "index"  # as the block of homing numbers them
+LAG = 1e-4  # share of the travel by which a commanded point ahead of an axis that stands tells of a hard stop
+
 KINDS = {"+": INSERT_PLUS, "-": INSERT_MINUS, "remove": REMOVE, "lose sample": LOSE_SAMPLE, "corrupt": CORRUPT}
 
 
@@ -109,6 +115,29 @@ def fill_push(p: Push, table: PushTable | None, tick: Any) -> None:
     if table is not None:
         p.force = table.force
         p.begin, p.end = nearest(table.at / tick), nearest((table.at + table.duration) / tick)
+
+
+def fill_marks(p: HomeMarksParams, home: HomeTable, pitch: float) -> None:
+    """Switch and marks lie where the file says that the axis finds them; a mark comes every `pitch` [m]."""
+    p.present, p.side, p.edge = 1, home.side, home.position
+    if home.by == "index":
+        p.mark, p.pitch = home.position, pitch
+        p.edge += home.side * home.edge_to_index
+
+
+def homing_params(  # noqa: PLR0913 - what a search depends on
+    home: HomeTable, *, travel: float, pitch: float, count: float, look: float, pressed: float
+) -> HomingParams:
+    """How a controller that looks every `look` [s] and counts by `count` [m] looks for its reference.
+
+    What stands for `pressed` [s], the commanded point ahead of it, is held by something.
+    """
+    return HomingParams(
+        way=WAYS.index(home.by), side=home.side, place=home.position, speed=home.speed, creep=home.creep,
+        back=home.back_off, longest=1.2 * travel + home.back_off, pitch=1.2 * pitch,
+        lag=max(LAG * travel, 10 * count), grain=1.5 * count, slack=0.1 * pressed,
+        still=max(1, round(pressed / look)),
+    )  # fmt: skip
 
 
 def fill_guard(p: GuardParams, table: ProtectionTable, *, sample: float, speed: float) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from detent.axisfile.tables import BurstTable, FrictionTable, FrictionTables
+from detent.axisfile.tables import BurstTable, FrictionTable, FrictionTables, HomeTable, InnerHomeTable
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, UNITS, Remedies, at_least, at_most, put
 from detent.units import format_quantity as text
@@ -33,6 +33,34 @@ def inside_travel(positions: Mapping[str, float], travel: float) -> Iterator[Con
             yield wrong(
                 f"{key} limits.travel", f"up to limits.travel, {text(travel, 'm')}", put(key, at_most(travel, "m"))
             )
+
+
+def home(  # noqa: PLR0913 - an axis, and how it is written
+    remedy: Remedies, table: HomeTable | None, ends: tuple[float, float], speed: float, *, unit: str = "m", at: str = ""
+) -> Iterator[Contradiction]:
+    """A reference can be found, and lies where the axis, with `ends` [m] and a largest `speed` [m/s], may come.
+
+    `at` is what stands before the keys of its tables.
+    """
+    if table is None:
+        return
+    for key, value, most, largest in (
+        ("speed", table.speed, speed, "limits.speed"), ("creep", table.creep, table.speed, "home.speed")
+    ):  # fmt: skip
+        if value > most:
+            allowed = f"up to {largest}, {text(most, f'{unit}/s')}"
+            yield wrong(f"{at}home.{key} {at}{largest}", allowed, remedy.most(f"{at}home.{key}", most))
+    end, travel = ends[1] if table.side > 0 else ends[0], ends[1] - ends[0]
+    inner, contact = isinstance(table, InnerHomeTable), table.by == "contact"
+    farthest = end - table.side * table.edge_to_index if inner and table.by == "index" else end
+    beyond, room = (table.position - farthest) * table.side, 0.0 if inner else 0.5 * table.back_off
+    if not -(0.0 if contact else travel) <= beyond <= room:
+        place = f"{text(farthest, unit)}, the end of the travel" if contact else "within the travel"
+        if farthest != end:
+            place = f"within the travel, and home.edge_to_index before its end: up to {text(farthest, unit)}"
+        allowed = place if inner else f"{place}, or up to half of home.back_off beyond it"
+        keys = f"{at}home.position {at}home.back_off {at}limits.travel"
+        yield wrong(keys, allowed, remedy.exactly(f"{at}home.position", farthest))
 
 
 def end_of_move(remedy: Remedies, timeout: float, settled: float, tick: float) -> Iterator[Contradiction]:

@@ -260,11 +260,36 @@ class HomeTable(Table, frozen=True):
     def completed(self, ends: tuple[float, float], speed: float, pitch: float) -> Self:
         """The same with what was left to the ends of the travel [m], to the largest speed [m/s] and to a turn [m]."""
         search = speed / 10 if math.isnan(self.speed) else self.speed
+        back = (ends[1] - ends[0]) / 50 if math.isnan(self.back_off) else self.back_off
+        behind = 0.4 * pitch if math.isnan(self.edge_to_index) else self.edge_to_index
+        end = ends[1] if self.side > 0 else ends[0]
         derived = {
-            "position": ends[1] if self.side > 0 else ends[0], "speed": search, "creep": search / 10,
-            "back_off": (ends[1] - ends[0]) / 50, "edge_to_index": 0.4 * pitch,
+            "position": end - self.side * self.inside(back, behind), "speed": search, "creep": search / 10,
+            "back_off": back, "edge_to_index": behind,
         }  # fmt: skip
         return self.model_copy(update={key: new for key, new in derived.items() if math.isnan(getattr(self, key))})
+
+    def inside(self, back: float, behind: float) -> float:
+        """How far inside the travel a reference lies of which nobody states where [m].
+
+        `back` is the way of backing off, `behind` that from the edge of a switch to its mark [m].
+        """
+        del back, behind
+        return 0.0
+
+
+class InnerHomeTable(HomeTable, frozen=True):
+    """The same of an axis that cannot pass the ends of its travel."""
+
+    position: Length = optional(
+        "position of the axis at the reference", math.nan,
+        derived="contact: the end of the travel in that direction; else its switch is home.back_off before it",
+        ge=-1e5, le=1e5,
+    )  # fmt: skip
+
+    def inside(self, back: float, behind: float) -> float:
+        """A switch or a mark beyond the end could never be passed [m]."""
+        return 0.0 if self.by == "contact" else back + (behind if self.by == "index" else 0.0)
 
 
 class LimitSwitchTable(Table, frozen=True):

@@ -95,6 +95,18 @@ def is_held(p: HomingParams, r: Homing, s: Seen) -> bool:
 
 
 @step
+def is_under_way(r: Homing) -> bool:
+    """True while the axis shall move, and not come to rest."""
+    return r.phase in (CLEAR, SEARCH, BACK, APPROACH, MARK, RETREAT)
+
+
+@step
+def is_pressed(r: Homing, s: Seen) -> bool:
+    """True of a search that has ended against something: the commanded point has run ahead into it."""
+    return r.still > 0 and s.ahead * r.velocity > 0.0
+
+
+@step
 def look_for(p: HomingParams, r: Homing, s: Seen) -> int:
     """On the way to the reference, fast or slowly."""
     held = is_held(p, r, s)

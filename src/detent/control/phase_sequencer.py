@@ -4,7 +4,7 @@ A move is a distance in steps. While the command counter is above the threshold 
 table; from then on, until the next command, it is the absolute error within the pitch.
 """
 
-from detent.kernel.registers import Registers, i1, i2_array, i4, i8, register, u1, u2
+from detent.kernel.registers import Registers, i1, i2, i2_array, i4, i8, register, u1, u2
 from detent.kernel.step import step
 
 ACQUIRE, SPEED, SETTLE_BUSY, SETTLE_READY, HOLD = 0, 1, 2, 3, 4  # states of specification 4
@@ -43,6 +43,7 @@ class Sequencer(Registers):
     direction: i1 = register("direction register 101: 1 or -1")
     remaining: i4 = register("signed pulses still to come: position error of the incremental servo", unit="count")
     position: i8 = register("pulses since the bridge was enabled, forward less backward", unit="count")
+    ceiling: i2 = register("largest velocity, written by the host; 0: that of the table", unit="count")
     switched: i8 = register("tick in which position mode was entered", unit="tick")
     ready_at: i8 = register("end of one-shot 108", unit="tick")
     stop_at: i8 = register("end of one-shot 109", unit="tick")
@@ -124,5 +125,6 @@ def next_timer(r: Sequencer) -> int:
 def setpoint(p: SequencerParams, r: Sequencer, absolute_error: int) -> int:
     """Word 100c: signed table velocity in speed mode, position error in position mode."""
     if r.mode == SPEED_MODE:
-        return p.table[min(r.distance, p.last)] * r.direction
+        velocity = p.table[min(r.distance, p.last)]
+        return (min(velocity, r.ceiling) if r.ceiling > 0 else velocity) * r.direction
     return r.remaining if p.incremental else absolute_error

@@ -1,6 +1,7 @@
 """What an axis has along its way: a switch at one side, index marks of its encoder, limit switches at both ends."""
 
 import math
+from typing import Any
 
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import step
@@ -13,6 +14,13 @@ class HomeWires(Registers):
     switch: u1 = register("1 on the home switch")
     marks: i8 = register("index marks passed", unit="count")
     mark: EncoderWord = block("encoder at the last one")
+
+
+class HomeLevels(Registers):
+    """The same two wires of an axis whose controller counts for itself: what it had counted at a mark is its own."""
+
+    switch: u1 = register("1 on the home switch")
+    marks: i8 = register("index marks passed", unit="count")
 
 
 class EndWires(Registers):
@@ -57,15 +65,23 @@ def latch(word: EncoderWord, travel: float, position: float) -> None:
 
 
 @step
-def sense_home(p: HomeMarksParams, r: HomeMarks, wires: HomeWires, position: float, travel: float) -> None:
-    """Switch and marks with the axis at `position` [m], whose encoder has `travel` [m] per count."""
+def sense_marks(p: HomeMarksParams, r: HomeMarks, wires: Any, position: float) -> None:
+    """Switch and marks with the axis at `position` [m], on `HomeWires` or `HomeLevels`."""
     wires.switch = 1 if (position - p.edge) * p.side >= 0.0 else 0
     if p.pitch > 0.0:
         cell = math.floor((position - p.mark) / p.pitch)
         if cell != r.cell:
             wires.marks += 1
-            latch(wires.mark, travel, p.mark + max(cell, r.cell) * p.pitch)
             r.cell = cell
+
+
+@step
+def sense_home(p: HomeMarksParams, r: HomeMarks, wires: HomeWires, position: float, travel: float) -> None:
+    """The same, with what an encoder of `travel` [m] per count latches at a mark."""
+    before = r.cell
+    sense_marks(p, r, wires, position)
+    if r.cell != before:
+        latch(wires.mark, travel, p.mark + max(before, r.cell) * p.pitch)
 
 
 @step
@@ -75,7 +91,7 @@ def sense_ends(p: EndSwitchParams, wires: EndWires, position: float) -> None:
     wires.upper = 1 if position < p.upper else 0
 
 
-def stand_home(p: HomeMarksParams, r: HomeMarks, wires: HomeWires, position: float) -> None:
+def stand_home(p: HomeMarksParams, r: HomeMarks, wires: HomeWires | HomeLevels, position: float) -> None:
     """At power-on an axis has passed no mark."""
     wires.switch = int(bool(p.present) and (position - p.edge) * p.side >= 0.0)
     r.cell = math.floor((position - p.mark) / p.pitch) if p.pitch > 0.0 else 0

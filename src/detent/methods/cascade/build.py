@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from detent.axisfile import blocks
 from detent.axisfile.blocks import fill_guard, fill_push, samples
 from detent.axisfile.elementwise import least, most, root, up
 from detent.axisfile.tables import HomeTable
@@ -20,10 +21,8 @@ from detent.plant.linear_two_mass import fastest_rate
 LARGEST_ANGLE = 0.5
 """Fastest rate of the plant times the tick: a swing of that rate then loses 0.02 % of its amplitude per radian."""
 
-WAYS = "contact", "switch", "index"  # as the block of homing numbers them
+CONTACT_TIME = 0.01  # time that tells of a hard stop [s], or half as long as the guard would let it
 DEEPEST = 1e-4  # share of the travel by which the largest effort presses a hard stop in
-LAG = 1e-4  # share of the travel by which a commanded point ahead of an axis that stands tells of a hard stop
-CONTACT_TIME = 0.01  # for so long [s], or half as long as the guard would let it
 
 LINK_TIME = 5e-3  # within which a second word that is none is a fault [s]
 HALF_SWING = 0.1  # longest half swing that is part of an oscillation [s]
@@ -88,25 +87,17 @@ def _fill_home(p: Any, spec: CascadeSpec, home: HomeTable) -> None:
         stop.stiffness = least(spec.largest_effort / (DEEPEST * spec.limits.travel), mass * (rate * rate))
         stop.damping = root(stop.stiffness * mass)
         return
-    marks = p.plant.home
-    marks.present, marks.side, marks.edge = 1, home.side, home.position
-    if home.by == "index":
-        marks.mark, marks.pitch = home.position, spec.mechanics.travel_per_revolution or 0.0
-        marks.edge += home.side * home.edge_to_index
+    blocks.fill_marks(p.plant.home, home, spec.mechanics.travel_per_revolution or 0.0)
 
 
 def homing_params(spec: CascadeSpec, home: HomeTable) -> HomingParams:
     """How the controller looks for its reference."""
-    period, travel = spec.method.sample_period, spec.limits.travel
-    turn = spec.mechanics.travel_per_revolution or 0.0
-    count = spec.encoder_of("position").resolution or 1e-9 * travel
-    watches = [time for time in (spec.protection.stuck_time, spec.protection.reversed_time) if time > 0.0]
-    pressed = min([CONTACT_TIME, *(0.5 * time for time in watches)])
-    return HomingParams(
-        way=WAYS.index(home.by), side=home.side, place=home.position, speed=home.speed, creep=home.creep,
-        back=home.back_off, longest=1.2 * travel + home.back_off, pitch=1.2 * turn,
-        lag=max(LAG * travel, 10 * count), grain=1.5 * count, slack=0.1 * pressed,
-        still=max(1, round(pressed / period)),
+    travel, table = spec.limits.travel, spec.protection
+    watches = [time for time in (table.stuck_time, table.reversed_time) if time > 0.0]
+    return blocks.homing_params(
+        home, travel=travel, pitch=spec.mechanics.travel_per_revolution or 0.0,
+        count=spec.encoder_of("position").resolution or 1e-9 * travel, look=spec.method.sample_period,
+        pressed=min([CONTACT_TIME, *(0.5 * time for time in watches)]),
     )  # fmt: skip
 
 

@@ -232,23 +232,11 @@ def _home(spec: CascadeSpec) -> Iterator[Contradiction]:
     home, limits = spec.home, spec.limits
     if home is None:
         return
-    remedy = remedy_of(spec)
     if home.by == "index" and not spec.mechanics.travel_per_revolution:
         allowed = "an index mark where a motor turns, whose mechanics.travel_per_revolution is stated"
         yield wrong("home.by", allowed, put("home.by", '"switch"'))
-    if home.speed > limits.speed:
-        allowed = f"up to limits.speed, {text(limits.speed, spec.unit('m/s'))}"
-        yield wrong("home.speed limits.speed", allowed, remedy.most("home.speed", limits.speed))
-    if home.creep > home.speed:
-        allowed = f"up to home.speed, {text(home.speed, spec.unit('m/s'))}"
-        yield wrong("home.creep home.speed", allowed, remedy.most("home.creep", home.speed))
-    end = spec.highest if home.side > 0 else limits.lowest
-    beyond = (home.position - end) * home.side
-    inside = 0.0 if home.by == "contact" else limits.travel
-    if not -inside <= beyond <= 0.5 * home.back_off:
-        place = f"{text(end, spec.unit('m'))}, the end of the travel" if home.by == "contact" else "within the travel"
-        allowed = f"{place}, or up to half of home.back_off beyond it"
-        yield wrong("home.position home.back_off limits.travel", allowed, remedy.exactly("home.position", end))
+    ends = limits.lowest, spec.highest
+    yield from common.home(remedy_of(spec), home, ends, limits.speed, unit=spec.unit("m"))
 
 
 RULES = (_motor, _masses, _gains, _encoders, _places, _heat, _rate, _drive, _supervision, _home)

@@ -7,7 +7,7 @@ import numpy as np
 
 from detent.control.guard import FOLLOWING, JUMPED, OVERSPEED, SATURATED, STUCK, enable_guard
 from detent.control.guard import TRAVEL as END_OF_TRAVEL
-from detent.control.homing import FAILED, FOUND, GIVE_WAY, IDLE, Homing, HomingParams, Seen, begin, seek
+from detent.control.homing import FAILED, FOUND, GIVE_WAY, IDLE, Homing, HomingParams, Seen, begin, is_pressed, seek
 from detent.control.homing import HALT as HALT_NOW
 from detent.control.homing import RUN as RUN_AT
 from detent.control.operation import (
@@ -109,7 +109,7 @@ def search(  # noqa: PLR0913 - as `serve`, and where the axis is
         run_at(memory.limits, memory.course, h.velocity)
     elif told in (HALT_NOW, FAILED):
         come_to_rest(memory.limits, memory.course)
-    if told == GIVE_WAY or (told == FAILED and s.ahead * h.velocity > 0.0 and h.still > 0):
+    if told == GIVE_WAY or (told == FAILED and is_pressed(h, s)):
         begin_at(memory.course, here.position)
         c.law.integral = 0.0
     elif told == FOUND:

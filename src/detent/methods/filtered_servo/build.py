@@ -2,8 +2,9 @@
 
 import math
 
-from detent.axisfile.blocks import fill_guard, fill_interference, fill_push, fill_slide
+from detent.axisfile.blocks import fill_guard, fill_interference, fill_marks, fill_push, fill_slide
 from detent.control.pulse_generator import PER_PULSE
+from detent.methods.filtered_servo.plant import FilteredPlantParams
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServoParams
 from detent.sensing.counted_speed import FIXED, FLOAT, NONE
@@ -33,6 +34,7 @@ def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
     fill_slide(m, spec, TICK, spec.drive.bridge_resistance)
     fill_interference(m.interference, spec.disturbance.lines, TICK)
     fill_push(m.push, spec.disturbance.push, TICK)
+    _fill_home(m, spec)
     fill_guard(c.guard, spec.protection, sample=GUARD_PERIOD, speed=spec.limits.speed / spec.pulse)
     c.look_ticks = round(GUARD_PERIOD / TICK)
     c.breaking = spec.protection.stuck_effort * c.deviation.word_limit
@@ -42,3 +44,16 @@ def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
     c.window = method.in_position
     c.window_ticks = round(method.in_position_time / TICK)
     return p
+
+
+def _fill_home(m: FilteredPlantParams, spec: FilteredServoSpec) -> None:
+    """The marks of the machine lie where the file says that the axis finds them, or its frame does."""
+    home = spec.home
+    if home is None:
+        return
+    if home.by != "contact":
+        fill_marks(m.home, home, spec.mechanics.travel_per_revolution)
+    elif home.side > 0:
+        m.train.right_end = home.position
+    else:
+        m.train.left_end = home.position

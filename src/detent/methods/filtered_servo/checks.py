@@ -119,6 +119,7 @@ def _command(spec: FilteredServoSpec) -> Iterator[Contradiction]:
         yield wrong(keys, allowed, remedy.least("limits.effort", spec.force_per_count))
     yield from common.end_of_move(remedy, method.timeout, method.in_position_time, TICK)
     yield from common.inside_travel({"mechanics.start_position": spec.mechanics.start_position}, spec.limits.travel)
+    yield from common.home(remedy, spec.home, (0.0, spec.limits.travel), spec.limits.speed)
 
 
 def _gain(spec: FilteredServoSpec) -> Iterator[Contradiction]:

@@ -37,6 +37,7 @@ from detent.sensing.counted_speed import (
     close_window,
     filter_speed,
 )
+from detent.sensing.home_marks import HomeLevels
 from detent.sensing.quadrature import ClockedDecoder, clock_decoder, edge_direction, is_settled, preset_decoder
 
 CLOCKS = 10  # decoder clocks of 1 us in a tick
@@ -56,6 +57,7 @@ class FilteredLines(Registers):
     missed: u4 = register("strobes lost so far", by=CONTROLLER)
     word: f8 = register("drive word: E, saturated", unit="count", by=CONTROLLER)
     run: u1 = register("1 enables the amplifier", by=CONTROLLER)
+    home: HomeLevels = block("home switch and index", by=PLANT)
 
 
 class FilteredControllerParams(Registers):
@@ -93,6 +95,9 @@ class FilteredController(Registers):
     guard: Guard = block("protection")
     watched: i8 = register("pulses at the last look of the guard", unit="count")
     look: i8 = register("ticks until its next look", unit="tick")
+    known: u1 = register("mailbox: 1 while the position is known: beyond an end of the travel it is then switched off")
+    marks: i8 = register("index marks seen", unit="count")
+    mark: i8 = register("pulses at the last one, from where the slide stood at power-on", unit="count")
 
 
 # ---- host actions
@@ -104,6 +109,7 @@ def power_on(c: FilteredController, lines: FilteredLines, sample_us: int) -> Non
     c.channel_a, c.channel_b = lines.a & 1, lines.b & 1
     c.clock.demanded = c.clock.period = c.clock.left = sample_us
     c.deviation.state = RESET
+    c.known = 1
     reset(c)
 
 
@@ -120,6 +126,25 @@ def reset(c: FilteredController) -> None:
     """Leave a fault."""
     c.deviation.reset = c.busy = 1
     c.event = 0
+
+
+@step
+def give_way(c: FilteredController) -> None:
+    """The command stands where the slide does: what it has run ahead is forgotten."""
+    g = c.generator
+    c.deviation.deviation = 0
+    g.goal = g.command = c.deviation.position
+    g.present = g.phase = g.direction = 0
+    c.busy = 1
+
+
+@step
+def shift_counters(c: FilteredController, pulses: int) -> None:
+    """The slide stands elsewhere by so many pulses than was thought: every place shifts, and nothing moves."""
+    c.deviation.position += pulses
+    c.watched += pulses
+    c.generator.goal += pulses
+    c.generator.command += pulses
 
 
 # ---- a clock of the decoder
@@ -228,8 +253,10 @@ def run_clocks(p: FilteredControllerParams, c: FilteredController, lines: Filter
 
 @hot_step
 def conclude(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
-    """After the clocks of a tick: is the decoder at rest, and what is the drive word now."""
+    """After the clocks of a tick: is the decoder at rest, was there a mark, and what is the drive word now."""
     c.busy = 0 if is_settled(c.decoder, c.channel_a, c.channel_b) else 1
+    if unlikely(c.marks != lines.home.marks):
+        c.marks, c.mark = lines.home.marks, c.deviation.position
     decide(p, c, lines)
 
 
@@ -253,9 +280,7 @@ def decide(p: FilteredControllerParams, c: FilteredController, lines: FilteredLi
 @step
 def leave_reset(c: FilteredController) -> None:
     """Power-on, or the host's answer to a fault: all counters at zero, the command where the slide stands."""
-    c.deviation.deviation = 0
-    c.generator.goal = c.generator.command = c.deviation.position
-    c.generator.present = c.generator.phase = c.generator.direction = 0
+    give_way(c)
     c.speed.count = c.speed.word = 0
     c.filter.accumulator = c.filter.input = 0
     c.filter.output = c.deviation.error = 0.0
@@ -265,7 +290,6 @@ def leave_reset(c: FilteredController) -> None:
     enable_guard(c.guard)
     c.failed = 0
     c.event = 0
-    c.busy = 1
 
 
 @hot_step
@@ -304,7 +328,7 @@ def protect(p: FilteredControllerParams, c: FilteredController, lines: FilteredL
     if d.state != RUN:
         return
     pushing = 1 if lines.word >= p.breaking else -1 if lines.word <= -p.breaking else 0
-    side = 1 if d.position > p.highest else -1 if d.position < p.lowest else 0
+    side = 0 if c.known == 0 else 1 if d.position > p.highest else -1 if d.position < p.lowest else 0
     limited = 1 if abs(lines.word) >= p.deviation.word_limit else 0
     watch_number(p.guard, c.guard, lines.word)
     if watch(p.guard, c.guard, 0, side, limited, pushing, moved):

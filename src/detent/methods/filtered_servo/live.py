@@ -4,18 +4,25 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from detent.axisfile.blocks import homing_params
 from detent.control.deviation_counter import DEVIATION_RANGE, FAULT, GUARDED, RESET, SPEED_RANGE
 from detent.control.guard import FOLLOWING, JUMPED, OVERSPEED, SATURATED, STUCK
 from detent.control.guard import TRAVEL as END_OF_TRAVEL
+from detent.control.homing import FAILED, FOUND, GIVE_WAY, IDLE, Homing, HomingParams, Seen, begin, is_pressed, seek
+from detent.control.homing import HALT as HALT_NOW
+from detent.control.homing import RUN as RUN_AT
 from detent.control.operation import (
     HALT,
     HOLD,
+    HOME,
     JOG,
     MOVE_BY,
     MOVE_TO,
     NOT_KNOWN,
+    REFERENCED,
     REST_OFF,
     RUN,
+    SEEK,
     TRAVEL,
     Operation,
     OperationParams,
@@ -29,8 +36,10 @@ from detent.methods.filtered_servo.controller import (
     FilteredController,
     FilteredControllerParams,
     FilteredLines,
+    give_way,
     go_to,
     reset,
+    shift_counters,
 )
 from detent.methods.filtered_servo.faults import places
 from detent.methods.filtered_servo.host import FilteredHost
@@ -41,6 +50,7 @@ from detent.methods.moves.legs import legs_of
 FAR = 1 << 50  # pulses: where a jog goes to where nothing ends it
 COUNTERS = 220  # faults of its counters: their cause on top of it
 LOOK = 1e-3  # time between two looks [s]
+PRESSED = 0.04  # time [s] for which the slide stands at a stop: it stands for half of that where its loop swings
 
 
 class FilteredLiveParams(Registers):
@@ -52,12 +62,15 @@ class FilteredLiveParams(Registers):
     home: f8 = register("where the slide stood at power-on", unit="m")
     rate: f8 = register("largest rate of the command", unit="uHz")
     seconds: f8 = register("time between two looks", unit="s")
+    homing: HomingParams = block("how it finds its reference")
 
 
 class FilteredLive(Registers):
     """What it remembers."""
 
     position: i8 = register("pulses at the last look", unit="count")
+    homing: Homing = block("how far the search for the reference has come")
+    seen: Seen = block("what the last look of it saw")
 
 
 @step
@@ -72,16 +85,45 @@ def brake(p: FilteredControllerParams, c: FilteredController) -> None:
 
 
 @step
-def run(q: FilteredLiveParams, c: FilteredController, o: Operation) -> None:
-    """A jog: towards the soft limit, or for ever; a velocity of 0 is a release."""
-    side = 1 if o.demand.velocity > 0.0 else -1
+def run(q: FilteredLiveParams, c: FilteredController, o: Operation, velocity: float) -> None:
+    """Towards the soft limit, or for ever."""
+    side = 1 if velocity > 0.0 else -1
     goal = c.generator.command + side * FAR
     if o.trust != NOT_KNOWN:
         lowest, highest = (q.operation.lowest - q.home) / q.pulse, (q.operation.highest - q.home) / q.pulse
         end = math.floor(highest) if side > 0 else math.ceil(lowest)
         goal = end if side * (end - c.generator.command) > 0 else c.generator.command
-    wanted = abs(o.demand.velocity) / q.pulse * PER_PULSE
+    wanted = abs(velocity) / q.pulse * PER_PULSE
     go_to(c, goal, round(min(max(wanted, 1.0), q.rate * o.demand.share)))
+
+
+@step
+def search(  # noqa: PLR0913 - as `serve`
+    q: FilteredLiveParams, p: FilteredControllerParams, c: FilteredController, lines: FilteredLines,
+    memory: FilteredLive, o: Operation,
+) -> int:  # fmt: skip
+    """One look of a homing; gives why it has failed, 0 while it has not."""
+    h, s = memory.homing, memory.seen
+    s.position, s.ahead = q.home + c.deviation.position * q.pulse, c.deviation.deviation * q.pulse
+    s.rests = 1 if c.away == 0 and c.settling == 0 else 0  # a slide that still rings tells no stop from a turn
+    s.switch, s.marks, s.mark = lines.home.switch, c.marks, q.home + c.mark * q.pulse
+    if o.demand.fresh:
+        o.trust = NOT_KNOWN
+        told = begin(q.homing, h, s)
+    else:
+        told = seek(q.homing, h, s)
+    if told == RUN_AT:
+        run(q, c, o, h.velocity)
+    elif told == GIVE_WAY or (told == FAILED and is_pressed(h, s)):
+        give_way(c)
+    elif told in (HALT_NOW, FAILED):
+        brake(p, c)
+    elif told == FOUND:
+        pulses = round((q.homing.place - h.latched) / q.pulse)
+        shift_counters(c, pulses)
+        memory.position += pulses
+        o.trust = REFERENCED
+    return h.code if told == FAILED else 0
 
 
 @serves(FilteredLiveParams)
@@ -101,9 +143,14 @@ def serve(  # noqa: PLR0913 - as all of its kind
         elif d.do == TRAVEL:
             go_to(c, round((d.target - q.home) / q.pulse), round(q.rate * d.share))
         elif d.do == RUN and d.velocity != 0.0:
-            run(q, c, o)
+            run(q, c, o, d.velocity)
         elif d.do in (RUN, HALT):
             brake(p, c)
+    if d.do == SEEK and (d.fresh or memory.homing.phase != IDLE):
+        a.refused = search(q, p, c, lines, memory, o)
+    elif d.fresh:
+        memory.homing.phase = IDLE
+    c.known = 0 if o.trust == NOT_KNOWN else 1
     c.event = 0
     place = c.deviation.position
     a.position = q.home + place * q.pulse
@@ -114,7 +161,7 @@ def serve(  # noqa: PLR0913 - as all of its kind
     a.error = c.deviation.deviation * q.pulse
     a.effort = lines.word / p.deviation.word_limit
     a.limited = 1 if abs(lines.word) >= p.deviation.word_limit else 0
-    a.rests = 1 if g.command == g.goal else 0
+    a.rests = 1 if g.command == g.goal and memory.homing.phase == IDLE else 0
     a.near = 1 if abs(c.deviation.deviation) <= p.window else 0
     a.ready = a.alone = 1
     a.fault = a.soft = 0
@@ -132,7 +179,13 @@ def live(spec: FilteredServoSpec, operation: Callable[..., OperationParams]) -> 
     q = FilteredLiveParams(pulse=spec.pulse, home=host.home, seconds=LOOK)
     q.look_ticks = round(LOOK / host.machine.tick)
     q.rate = spec.limits.speed / spec.pulse * PER_PULSE
-    q.operation = operation(LOOK, spec.method.in_position_time, (0.0, spec.limits.travel), MOVE_TO, MOVE_BY, JOG)
+    motions = (MOVE_TO, MOVE_BY, JOG) if spec.home is None else (MOVE_TO, MOVE_BY, JOG, HOME)
+    q.operation = operation(LOOK, spec.method.in_position_time, (0.0, spec.limits.travel), *motions)
+    if spec.home is not None:
+        q.homing = homing_params(
+            spec.home, travel=spec.limits.travel, pitch=spec.mechanics.travel_per_revolution,
+            count=spec.pulse, look=LOOK, pressed=PRESSED,
+        )  # fmt: skip
     machine: Any = host.machine
     machine.params.controller.guard.softly = SOFT
     table, speed = spec.protection, spec.limits.speed

@@ -8,6 +8,7 @@ from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
 from detent.plant.push import Push, push_force
 from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right
 from detent.sensing.gauge import Gauge, read_gauge
+from detent.sensing.home_marks import HomeMarks, HomeMarksParams, sense_marks
 from detent.sensing.interference import Interference, InterferenceParams, count_losses, interfere
 
 
@@ -34,6 +35,7 @@ class FilteredPlantParams(Registers):
     train: DriveTrainParams = block("motor and mechanics")
     interference: InterferenceParams = block("noise on the pulse lines")
     push: Push = block("disturbing force")
+    home: HomeMarksParams = block("switch and index by which it finds its reference")
 
 
 class FilteredPlant(Registers):
@@ -45,6 +47,7 @@ class FilteredPlant(Registers):
     train: DriveTrain = block("motor and slide")
     interference: Interference = block("noise on the pulse lines")
     gauge: Gauge = block("what an observer sees of the move")
+    home: HomeMarks = block("switch and index by which it finds its reference")
 
 
 @hot_step
@@ -108,6 +111,8 @@ def sense(p: FilteredPlantParams, plant: FilteredPlant, x: float, tick: int, lin
         hold_levels(plant.encoder, lines)
     if unlikely(x >= plant.encoder.next_right or x < plant.encoder.next_left):
         pass_edges(p.encoder, plant.encoder, lines, plant.sampled, x)
+        if p.home.present:
+            sense_marks(p.home, plant.home, lines.home, x)
     plant.sampled = x
     if unlikely(tick >= plant.interference.next_tick):
         disturb(p.interference, plant.interference, tick, lines)

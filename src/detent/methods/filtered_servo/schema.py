@@ -13,6 +13,7 @@ from detent.axisfile.tables import (
     AxisTable,
     DisturbanceTable,
     EncoderTable,
+    InnerHomeTable,
     MotionProtectionTable,
     MotorTable,
     ScrewTable,
@@ -127,6 +128,7 @@ class FilteredServoSpec(AxisSpec, frozen=True):
     encoder: EncoderTable
     method: MethodTable = Field(default_factory=MethodTable)
     protection: MotionProtectionTable = Field(default_factory=MotionProtectionTable)
+    home: InnerHomeTable | None = None
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
     @property
@@ -194,4 +196,8 @@ def fill_derived(spec: FilteredServoSpec) -> FilteredServoSpec:
     friction = spec.mechanics.friction
     static = max(friction.right.static, friction.left.static)
     share = breaking_effort(static, spec.word_limit * spec.force_per_count)
+    if spec.home is not None:
+        ends = 0.0, spec.limits.travel
+        turn = spec.mechanics.travel_per_revolution
+        spec = spec.changed(home=spec.home.completed(ends, spec.limits.speed, turn))
     return spec.filled(mechanics={"start_position": 0.1 * spec.limits.travel}, protection={"stuck_effort": share})

@@ -27,6 +27,7 @@ from detent.methods.filtered_servo.controller import (
 from detent.methods.filtered_servo.plant import FilteredPlant, FilteredPlantParams, hold_levels, move, sense
 from detent.plant.drive_train import DriveTrain
 from detent.sensing.encoder import stand_at
+from detent.sensing.home_marks import stand_home
 from detent.sensing.interference import start_interference
 
 TICK = 10 * 1e-6  # base tick [s]
@@ -90,4 +91,5 @@ def switch_on(p: FilteredServoParams, r: FilteredServo, position: float, sample_
     start_interference(p.plant.interference, plant.interference, seed ^ 0x5DEECE66D)
     plant.amplifier.left = 1
     hold_levels(plant.encoder, r.lines)
+    stand_home(p.plant.home, plant.home, r.lines.home, position)
     power_on(r.controller, r.lines, sample_us)

@@ -2,7 +2,7 @@
 
 import math
 
-from detent.axisfile.blocks import fill_drive_train, fill_guard, fill_interference, fill_push
+from detent.axisfile.blocks import fill_drive_train, fill_guard, fill_interference, fill_marks, fill_push
 from detent.control.phase_law import LawParams
 from detent.control.phase_sequencer import NEVER, TABLE, SequencerParams
 from detent.kernel.turn_table import TURN
@@ -40,6 +40,8 @@ def build_phase_servo(spec: PhaseServoSpec) -> PhaseServoParams:
     )  # fmt: skip
     fill_interference(plant.interference, spec.disturbance.lines, spec.tick)
     fill_push(plant.push, spec.disturbance.push, spec.tick)
+    if spec.home is not None:
+        fill_marks(plant.home, spec.home, 0.0)  # a switch; the positioning points are the detector's
     return p
 
 

@@ -97,6 +97,16 @@ def _way(spec: PhaseServoSpec) -> Iterator[Contradiction]:
     margin = spec.printing.left_margin
     places = {"mechanics.start_position": spec.mechanics.start_position, "print.left_margin": margin}
     yield from common.inside_travel(places, travel)
+    yield from common.home(remedy, spec.home, (0.0, travel), spec.limits.speed)
+    reference = 0.0 if spec.home is None else spec.home.position
+    point = round(reference / pitch) * pitch
+    if abs(reference - point) > 0.5 * spec.step:
+        yield wrong(
+            "home.position detector.pitches_per_revolution mechanics.pulley_circumference",
+            f"a positioning point, a whole number of pitches of the detector, {text(pitch, 'm')}; here "
+            f"{reference / pitch:.5g}",
+            remedy.exactly("home.position", point),
+        )
     distance = spec.printing.character_pitch
     whole = max(1, round(distance / pitch))
     if abs(distance - whole * pitch) > 1e-3 * spec.step:

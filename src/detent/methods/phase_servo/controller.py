@@ -38,6 +38,7 @@ from detent.kernel.loop import controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
 from detent.sensing.counted_speed import PulseCounter, PulseCounterParams, add_pulses, close_window
+from detent.sensing.home_marks import HomeLevels
 from detent.sensing.phase_converters import (
     ConverterParams,
     Converters,
@@ -91,6 +92,7 @@ class PhaseLines(Registers):
     )
     request: i1 = register("request of the PWM in its second: 1 plus, -1 minus, 0 neither", by=CONTROLLER)
     enable: u1 = register("1 once the bridge may drive", by=CONTROLLER)
+    home: HomeLevels = block("home switch", by=PLANT)
 
 
 @step

@@ -8,6 +8,7 @@ from detent.methods.phase_servo.controller import PhaseLines
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
 from detent.plant.push import Push, push_force
 from detent.sensing.gauge import Gauge, read_gauge
+from detent.sensing.home_marks import HomeMarks, HomeMarksParams, sense_marks
 from detent.sensing.interference import Interference, InterferenceParams, count_losses, interfere
 from detent.sensing.phase_detector import Detector, DetectorParams, compare
 
@@ -20,6 +21,7 @@ class PhasePlantParams(Registers):
     bridge: SplitBridgeParams = block("bridge")
     push: Push = block("disturbing force")
     train: DriveTrainParams = block("motor and mechanics")
+    home: HomeMarksParams = block("switch by which it finds its reference")
 
 
 class PhasePlant(Registers):
@@ -30,6 +32,7 @@ class PhasePlant(Registers):
     bridge: SplitBridge = block("bridge")
     train: DriveTrain = block("motor and carriage")
     gauge: Gauge = block("what an observer sees of the move")
+    home: HomeMarks = block("switch by which it finds its reference")
 
 
 @step
@@ -50,6 +53,8 @@ def sense(p: PhasePlantParams, plant: PhasePlant, x: float, lines: PhaseLines, t
     lines.ps = compare(p.detector, plant.detector, lines.carrier + 1, x)
     if unlikely(tick >= plant.interference.next_tick or lines.swallowed + lines.missed > 0):
         disturb(p, plant, lines, tick)
+    if p.home.present:
+        sense_marks(p.home, plant.home, lines.home, x)
 
 
 @hot_step

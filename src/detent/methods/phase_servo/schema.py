@@ -14,6 +14,7 @@ from detent.axisfile.tables import (
     AxisTable,
     DisturbanceTable,
     FrictionTables,
+    InnerHomeTable,
     MotorTable,
     ProtectionTable,
     breaking_effort,
@@ -187,6 +188,19 @@ class PrintTable(Table, frozen=True):
     hammer_time: Time = optional("time the carriage stands for a character after ready", 8e-3, ge=0.0, le=1.0)
 
 
+class PhaseHomeTable(InnerHomeTable, frozen=True):
+    """How a live axis finds its reference; without the table it cannot home."""
+
+    by: Literal["index"] = required(
+        "what gives the reference: the first positioning point behind the edge of a switch; the edge chooses the "
+        "pitch, the detector's phase the place in it", '"index"'
+    )  # fmt: skip
+    edge_to_index: Length = optional(
+        "way from the edge of the switch back to that positioning point", math.nan,
+        derived="0.4 pitches of the detector", ge=0.0, le=1e3,
+    )  # fmt: skip
+
+
 class PhaseServoSpec(AxisSpec, frozen=True):
     """A phase-servo axis as its file describes it, in SI units."""
 
@@ -200,6 +214,7 @@ class PhaseServoSpec(AxisSpec, frozen=True):
     method: MethodTable = Field(default_factory=MethodTable)
     protection: ProtectionTable = Field(default_factory=ProtectionTable)
     printing: PrintTable = Field(default_factory=PrintTable, alias="print")
+    home: PhaseHomeTable | None = None
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
     @property
@@ -251,6 +266,11 @@ def fill_derived(spec: PhaseServoSpec) -> PhaseServoSpec:
     # Force on the carriage at standstill with a full drive word [N].
     current = min(spec.drive.supply / (spec.motor.resistance + spec.drive.bridge_resistance), spec.limits.effort)
     stall = current * spec.motor.torque_constant * 2 * math.pi / spec.mechanics.pulley_circumference
+    if spec.home is not None:
+        home = spec.home.completed((0.0, travel), spec.limits.speed, spec.pitch)
+        # Of a place that nobody states it takes the positioning point next to it.
+        own = spec.home.position if spec.home.position >= 0.0 else round(home.position / spec.pitch) * spec.pitch
+        spec = spec.changed(home=home.model_copy(update={"position": own}))
     character = max(1, round(INCH / 10 / spec.pitch)) * spec.pitch
     return spec.filled(
         mechanics={"start_position": 0.1 * travel},

@@ -71,6 +71,13 @@ def halt(p: TableControllerParams, c: TableController) -> None:
         r.state = STOPPING
 
 
+@step
+def hold_back(q: TableLiveParams, c: TableController, o: Operation) -> None:
+    """A number has a speed of its own: from the look after its start on no more of it than is allowed."""
+    if o.demand.do == NUMBERED and o.demand.share < 1.0:
+        c.positioner.limit = min(c.positioner.limit, round(q.speed * o.demand.share * q.dial))
+
+
 @serves(TableLiveParams)
 @step
 def serve(  # noqa: PLR0913 - as all of its kind
@@ -104,6 +111,7 @@ def serve(  # noqa: PLR0913 - as all of its kind
             set_out(p.positioner, r, round(d.target / q.count), SHORTEST, round(q.speed * d.share * q.dial))
         elif d.do in (RUN, HALT):
             halt(p, c)
+    hold_back(q, c, o)
     place = r.angle.position
     a.position = place * q.count
     a.velocity = (place - memory.position) * q.count / q.seconds

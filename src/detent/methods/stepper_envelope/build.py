@@ -164,6 +164,7 @@ def make_tables(table: StepperTable) -> MotorTables:
 
 def build_stepper(spec: StepperEnvelopeSpec, name: str, tables: MotorTables) -> "StepperParams":
     """Parameters of one motor."""
+    from detent.axisfile.blocks import fill_marks
     from detent.methods.stepper_envelope.controller import load_rule
     from detent.methods.stepper_envelope.system import StepperParams
     from detent.plant.stepper_rotor import fill_curve
@@ -182,4 +183,7 @@ def build_stepper(spec: StepperEnvelopeSpec, name: str, tables: MotorTables) -> 
     r.torque, r.friction = motor.holding_torque, motor.friction_torque
     r.damping = DAMPING * math.sqrt(r.teeth * motor.holding_torque * inertia)
     fill_curve(r, motor.pull_out, table.max_hz)
+    p.plant.origin, p.plant.way = table.mechanics.lower_end, table.step / motor.step_angle
+    if table.home is not None:
+        fill_marks(p.plant.home, table.home, 0.0)
     return p

@@ -1,6 +1,7 @@
 """Controller of one stepper: control unit, step timer and phases (stepper-envelope specification 2.2, blocks B4, B5).
 
-What the host lays ready are both tables. The loop is open: nothing comes back along the lines.
+What the host lays ready are both tables. The loop is open: nothing comes back along the lines but a home switch, which
+the control unit does not look at.
 """
 
 from collections.abc import Sequence
@@ -8,10 +9,11 @@ from collections.abc import Sequence
 from detent.control.step_rule import IDLE, PAUSE, STEP, StepRule, StepRuleParams, next_entry, next_step
 from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, word_within
 from detent.kernel.loop import HostArray, controls, i2_signal
-from detent.kernel.registers import CONTROLLER, Registers, block, i1, i8, register, u1, u4
+from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i8, register, u1, u4
 from detent.kernel.step import bounded, hot_step, step
 from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
 from detent.planning.step_ramp import StepRamp
+from detent.sensing.home_marks import HomeLevels
 
 Entries = HostArray  # table of int16, see `control.step_rule.next_entry`
 NOWHERE = -(1 << 62)  # position that is never reached
@@ -36,7 +38,7 @@ class StepperController(Registers):
 
 
 class StepperLines(Registers):
-    """Wires to the power stage; nothing comes back.
+    """Wires to the power stage, and a switch; of the motor nothing comes back.
 
     A tick has one pulse at most: it takes one tick of the timer, or 2 us at most (`build.instant`), and a period takes
     ten ticks of the timer (`rules.LEAST_TICKS`) and 15 us (`step_ramp.MAX_HZ`) at least.
@@ -46,6 +48,7 @@ class StepperLines(Registers):
     direction: i1 = register("direction line: 1 or -1", by=CONTROLLER)
     period: u4 = register("period that the last pulse began; 0: hold, no step follows it", unit="tick", by=CONTROLLER)
     disable: u1 = register("1: no current in the coils, the motor is free", by=CONTROLLER)
+    home: HomeLevels = block("home switch", by=PLANT)
 
 
 @hot_step

@@ -9,19 +9,26 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from detent.axisfile.blocks import homing_params
 from detent.control.guard import FOLLOWING
 from detent.control.guard import TRAVEL as END_OF_TRAVEL
+from detent.control.homing import FAILED, FOUND, IDLE, ON, Homing, HomingParams, Seen, begin, is_under_way, seek
+from detent.control.homing import HALT as HALT_NOW
+from detent.control.homing import RUN as RUN_AT
 from detent.control.move_commands import lower_end, upper_end
 from detent.control.operation import (
     HALT,
     HOLD,
+    HOME,
     JOG,
     LOWER,
     MOVE_BY,
     MOVE_TO,
     NOT_KNOWN,
+    REFERENCED,
     REST_OFF,
     RUN,
+    SEEK,
     TRAVEL,
     UPPER,
     Operation,
@@ -63,6 +70,7 @@ class StepperLiveParams(Registers):
     last: i4 = register("last index of the ramp", unit="count")
     up: StepTableParams = block("table of the way up")
     down: StepTableParams = block("table of the way down")
+    homing: HomingParams = block("how it finds its reference")
 
 
 class StepperLive(Registers):
@@ -74,6 +82,9 @@ class StepperLive(Registers):
     jogs: u1 = register("1 while the goal is the end of the travel, wherever that is")
     word: i4 = register("word that is asked for", unit="count")
     overruns: i8 = register("ends that were moved nearer than the motor could stop", unit="count")
+    homing: Homing = block("how far the search for the reference has come")
+    seen: Seen = block("what the last look of it saw")
+    shift: i8 = register("steps by which a search has moved its place in the tables, to have room", unit="count")
 
 
 @step
@@ -152,6 +163,39 @@ def is_pending(c: StepperController, memory: StepperLive) -> bool:
 
 
 @step
+def search(  # noqa: PLR0913 - as `serve`
+    q: StepperLiveParams, p: StepperControllerParams, c: StepperController, lines: StepperLines, memory: StepperLive,
+    o: Operation, up: Entries, down: Entries,
+) -> int:  # fmt: skip
+    """One look of a homing; gives why it has failed, 0 while it has not."""
+    h, s, rule = memory.homing, memory.seen, c.rule
+    s.rests = 0 if rule.index >= 0 or is_pending(c, memory) else 1
+    if o.demand.fresh:
+        memory.shift = 0
+    s.position, s.switch = q.lower + (rule.position - memory.shift) * q.step, lines.home.switch
+    if o.demand.fresh:
+        o.trust = NOT_KNOWN
+        told = begin(q.homing, h, s)
+    else:
+        told = seek(q.homing, h, s)
+    if told == RUN_AT or (told == ON and s.rests and is_under_way(h)):
+        heading = 1 if h.velocity > 0.0 else -1
+        if s.rests:  # nobody knows where in its tables it is: it takes all the room that they have
+            room = 0 if heading > 0 else q.up.steps
+            memory.shift += room - rule.position
+            rule.position = room
+        memory.jogs, memory.word = 1, word_of(p, min(abs(h.velocity), q.speed * o.demand.share) / q.step)
+        aim(q, p, c, memory, o, heading, up, down)
+    elif told in (HALT_NOW, FAILED):
+        let_go(c, memory)
+    elif told == FOUND:
+        place = round((q.homing.place + s.position - h.latched - q.lower) / q.step)
+        rule.position = memory.goal = min(max(place, 0), q.up.steps)
+        o.trust = REFERENCED
+    return h.code if told == FAILED else 0
+
+
+@step
 def let_go(c: StepperController, memory: StepperLive) -> None:
     """The motor comes down its ramp."""
     memory.jogs = 0
@@ -183,7 +227,7 @@ def tell_how(  # noqa: PLR0913 - as `serve`
     runs = rule.index >= 0 and c.timer.period > 0
     a.velocity = a.commanded_velocity = rule.direction * q.step * p.timer.clock_hz / c.timer.period if runs else 0.0
     a.effort = 1.0 - lines.disable
-    a.rests = 0 if rule.index >= 0 or is_pending(c, memory) else 1
+    a.rests = 0 if rule.index >= 0 or is_pending(c, memory) or memory.homing.phase != IDLE else 1
     a.near = a.ready = 1
     a.fault = (
         FAULTS + rule.cause if rule.state == FAULT and rule.index < 0 and o.demand.do not in (REST_OFF, HOLD) else 0
@@ -210,6 +254,11 @@ def serve(  # noqa: PLR0913 - as all of its kind
             let_go(c, memory)
     elif d.edited and (memory.jogs or is_pending(c, memory)):
         aim(q, p, c, memory, o, rule.heading, up, down)
+    o.answer.refused = 0
+    if d.do == SEEK and (d.fresh or memory.homing.phase != IDLE):
+        o.answer.refused = search(q, p, c, lines, memory, o, up, down)
+    elif d.fresh:
+        memory.homing.phase = IDLE
     tell_how(q, p, c, lines, memory, o)
 
 
@@ -240,7 +289,12 @@ def live_motor(spec: StepperEnvelopeSpec, name: str, operation: Callable[..., Op
         last=len(tables.ramp) - 1, up=table_params(tables.up), down=table_params(tables.down),
     )  # fmt: skip
     ends = table.mechanics.lower_end, table.upper_end
-    q.operation = operation(LOOK, spec.controller.settle_time, ends, MOVE_TO, MOVE_BY, JOG, LOWER, UPPER)
+    motions = MOVE_TO, MOVE_BY, JOG, LOWER, UPPER, *(() if table.home is None else (HOME,))
+    q.operation = operation(LOOK, spec.controller.settle_time, ends, *motions)
+    if table.home is not None:
+        q.homing = homing_params(
+            table.home, travel=table.limits.travel, pitch=0.0, count=table.step, look=LOOK, pressed=LOOK
+        )
     memory = StepperLive(goal=motor.position, up_stop=tables.up.stop, down_stop=tables.down.stop)
     motor.r.lines.disable = 1
     rule = motor.controller.rule

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import wraps
 from itertools import combinations, pairwise
 
+from detent.axisfile.common_checks import home
 from detent.files.fields import unit_of
 from detent.files.findings import Contradiction, wrong
 from detent.files.nearest import BARELY, UNITS, Remedies, put
@@ -175,6 +176,13 @@ def _places(m: Motor) -> Found:
             f"{table.text(table.step, 'm')} or more: there the run upwards ends and the run downwards begins",
             higher if places[name] < table.steps else "move both apart",
         )
+
+
+def _home(m: Motor) -> Found:
+    """Its reference can be found."""
+    table, unit = m.table, "rad" if m.table.turns else "m"
+    ends = table.mechanics.lower_end, table.upper_end
+    yield from home(m.remedies, table.home, ends, table.limits.speed, unit=unit, at=f"stepper.{m.name}.")
 
 
 # ---- torque
@@ -407,6 +415,6 @@ def _per_motor(look: Callable[[Motor], Found]) -> Callable[[StepperEnvelopeSpec]
 
 RULES = (_names, *map(_per_motor, (
     _steps, _timer, _places, _constants, _curve, _torques, _ramp, _start_frequency, _rotor_swing, _zone_places,
-    _zone_overlap, _zone_speed,
+    _zone_overlap, _zone_speed, _home,
 )))  # fmt: skip
 """Contradictions are told in this order."""

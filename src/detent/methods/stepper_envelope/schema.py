@@ -17,7 +17,7 @@ from annotated_types import Ge, Le
 from pydantic import Field
 
 from detent.axisfile.motion import MovingTable
-from detent.axisfile.tables import AxisSpec, AxisTable
+from detent.axisfile.tables import AxisSpec, AxisTable, InnerHomeTable
 from detent.files.fields import Naming, Table, named, optional, required
 from detent.files.quantities import (
     Acceleration,
@@ -272,6 +272,15 @@ class ZoneTable(Table, frozen=True):
     direction: Literal["both", "up", "down"] = optional("direction of motion that it holds for", "both")
 
 
+class StepperHomeTable(InnerHomeTable, frozen=True):
+    """How a live motor finds its reference; without the table it cannot home."""
+
+    by: Literal["switch"] = required(
+        "what gives the reference: the edge of a switch, for a motor without a sensor feels neither stop nor mark",
+        '"switch"',
+    )
+
+
 class MethodTable(Table, frozen=True):
     """Form of the run-time rule (3.3)."""
 
@@ -295,6 +304,7 @@ class StepperTable(MovingTable, frozen=True):
     extremes: ExtremesTable = Field(default_factory=ExtremesTable)
     zone: dict[str, ZoneTable] = named("a stretch with its own speed limit", ZONE_NAME, max_length=14)
     method: MethodTable = Field(default_factory=MethodTable)
+    home: StepperHomeTable | None = None
 
     @property
     def step(self) -> float:
@@ -363,7 +373,10 @@ def _filled(table: StepperTable) -> StepperTable:
     extremes = _given(table.extremes, start=lower, turn=table.upper_end, stop=lower)
     if drive.current is None:
         drive = drive.model_copy(update={"current": table.motor.rated_current})
-    return table.model_copy(update={"mechanics": mechanics, "extremes": extremes, "drive": drive})
+    home, ends = table.home, (lower, table.upper_end)
+    if home is not None:
+        home = home.completed(ends, table.limits.speed, table.mechanics.per_turn)
+    return table.model_copy(update={"mechanics": mechanics, "extremes": extremes, "drive": drive, "home": home})
 
 
 def _given(table: Any, **defaults: float) -> Any:

@@ -11,7 +11,7 @@ import pytest
 from tests.filtered_servo_rig import EXAMPLE
 from tests.reference import reference_rows
 
-from detent.axisfile.tables import MotionProtectionTable
+from detent.axisfile.tables import HomeTable, MotionProtectionTable
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.build import build_filtered_servo
 from detent.methods.filtered_servo.controller import go_to
@@ -87,14 +87,21 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 }  # fmt: skip
 
 # Keys that are no matter of the machine, and where they are held.
-ELSEWHERE = {
-    "axis.name": "test_the_machine_does_not_know",
-    "axis.method": "tests/unit/methods/test_registry.py",
-    "motor.max_current": "test_cautions.py: current of the largest drive word",
-    "method.timeout": "test_rules.py: timeout; the jobs of the axis",
-} | dict.fromkeys(
-    (f"protection.{key}" for key in MotionProtectionTable.model_fields),
-    "tests/unit/axisfile/test_protection.py: each moves its own register; test_guard.py: what the registers do",
+ELSEWHERE = (
+    {
+        "axis.name": "test_the_machine_does_not_know",
+        "axis.method": "tests/unit/methods/test_registry.py",
+        "motor.max_current": "test_cautions.py: current of the largest drive word",
+        "method.timeout": "test_rules.py: timeout; the jobs of the axis",
+    }
+    | dict.fromkeys(
+        (f"protection.{key}" for key in MotionProtectionTable.model_fields),
+        "tests/unit/axisfile/test_protection.py: each moves its own register; test_guard.py: what the registers do",
+    )
+    | dict.fromkeys(
+        (f"home.{key}" for key in HomeTable.model_fields),
+        "tests/unit/axisfile/test_home.py; tests/unit/methods/test_homing.py",
+    )
 )
 
 

@@ -83,6 +83,8 @@ POSITION = [
         "limits.speed=90 mm/s",
         key="limits.speed",
     ),
+    given("search faster than the axis", "home.speed=0.2 m/s", key="home.speed"),
+    given("mark too near to the frame", "home.position=1 mm", key="home.position"),
     given("command", "method.command_acceleration=0.1 um/s^2", key="method.command_acceleration"),
     given("timeout", "method.timeout=20 ms", "method.in_position_time=20 ms", key="method.timeout"),
     given("long time in position", "method.in_position_time=3 s", key="method.in_position_time"),
@@ -142,7 +144,7 @@ MACHINE = [
         key="motor.resistance",
     ),
     edit("stiction", 'static = "2.26 N"', 'static = "1 N"', "27:1", "mechanics.friction.right.static"),
-    added("burst", f'[{BURST}]\nkind = "+"\nat = "1 s"\ncount = 2\nspacing = "5 us"', "50:1", f"{BURST}.spacing"),
+    added("burst", f'[{BURST}]\nkind = "+"\nat = "1 s"\ncount = 2\nspacing = "5 us"', "53:1", f"{BURST}.spacing"),
 ]
 
 ENTRIES = [*FILTER, *SAMPLING, *POSITION, *MACHINE]

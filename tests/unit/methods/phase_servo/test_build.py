@@ -12,7 +12,7 @@ import pytest
 from tests.phase_servo_rig import EXAMPLE
 from tests.reference import reference_rows
 
-from detent.axisfile.tables import ProtectionTable
+from detent.axisfile.tables import HomeTable, ProtectionTable
 from detent.control.phase_sequencer import NEVER
 from detent.errors import InputError
 from detent.kernel.turn_table import TURN
@@ -94,18 +94,25 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 }  # fmt: skip
 
 # Keys that are no matter of the machine, and where they are held.
-ELSEWHERE = {
-    "axis.name": "test_the_machine_does_not_know",
-    "axis.method": "tests/unit/methods/test_registry.py",
-    "motor.catalogue": "test_a_catalogue_motor_gives_its_constants",
-    "motor.max_current": "test_cautions.py: current limit",
-    "method.expected_spurious": "test_rules.py: protection",
-    "print.left_margin": "test_rules.py: left margin; the jobs of the axis",
-    "print.character_pitch": "test_rules.py: character pitch; the jobs of the axis",
-    "print.hammer_time": "the jobs of the axis",
-} | dict.fromkeys(
-    (f"protection.{key}" for key in ProtectionTable.model_fields),
-    "tests/unit/axisfile/test_protection.py: each moves its own register; test_guard.py: what the registers do",
+ELSEWHERE = (
+    {
+        "axis.name": "test_the_machine_does_not_know",
+        "axis.method": "tests/unit/methods/test_registry.py",
+        "motor.catalogue": "test_a_catalogue_motor_gives_its_constants",
+        "motor.max_current": "test_cautions.py: current limit",
+        "method.expected_spurious": "test_rules.py: protection",
+        "print.left_margin": "test_rules.py: left margin; the jobs of the axis",
+        "print.character_pitch": "test_rules.py: character pitch; the jobs of the axis",
+        "print.hammer_time": "the jobs of the axis",
+    }
+    | dict.fromkeys(
+        (f"protection.{key}" for key in ProtectionTable.model_fields),
+        "tests/unit/axisfile/test_protection.py: each moves its own register; test_guard.py: what the registers do",
+    )
+    | dict.fromkeys(
+        (f"home.{key}" for key in HomeTable.model_fields),
+        "tests/unit/axisfile/test_home.py; tests/unit/methods/test_homing.py",
+    )
 )
 
 

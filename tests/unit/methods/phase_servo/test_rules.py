@@ -35,6 +35,7 @@ TRACKER = [
         key="limits.speed",
     ),
     given("speed word", "method.speed_bits=5", key="method.speed_bits"),
+    given("reference between two points", "home.position=10 mm", key="home.position"),
     given(
         "long sample",
         "clock.sample_tap=24",

@@ -16,6 +16,7 @@ from tests.bad_files import example_text
 from tests.reference import reference_rows
 from tests.stepper_rig import COARSE_FINE, FINE_HZ, LOAD, MAX_HZ, MOTOR, RAMP, rotor_params
 
+from detent.axisfile.tables import HomeTable
 from detent.control.step_rule import start_move
 from detent.files.source import parse_source
 from detent.kernel.loop import advance
@@ -95,6 +96,7 @@ ELSEWHERE = {
     "axis.name": "test_the_motor_does_not_know",
     "axis.method": "tests/unit/methods/test_registry.py",
     "motion": "test_rotary.py",
+    **dict.fromkeys((f"home.{key}" for key in HomeTable.model_fields), "tests/unit/methods/test_homing.py"),
     "controller.settle_time": "test_the_motor_does_not_know; tests of the stage's runs",
 }
 

@@ -25,7 +25,7 @@ def test_each_motor_of_a_file_is_an_axis_of_its_own():
     for one in motors.values():
         takes = one.live.operation.takes
         assert takes >> ops.UPPER & 1
-        assert not takes >> ops.HOME & 1  # it has no sensor to find a place with
+        assert takes >> ops.HOME & 1  # each by a switch of its own
         assert one.state.lines.disable == 1  # no current at power-on
         assert one.live.operation.window_looks == 50
     assert motors["group_a"].feed[0] is not motors["group_b"].feed[0]

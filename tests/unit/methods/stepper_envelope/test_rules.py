@@ -24,6 +24,7 @@ FREQUENCIES = [
     given("no word for the frequency", "limits.speed=1 m/s", key="limits.speed"),
     given("a start that is none", "motor.start_frequency=1 Hz", key="motor.start_frequency"),
     given("a start divided away", "motor.start_frequency=10 Hz", "drive.start_safety=15", key="motor.start_frequency"),
+    given("search faster than the motor", "home.speed=30 mm/s", key="home.speed"),
     given("half a tooth pitch", "motor.steps_per_turn=202", key="motor.steps_per_turn"),
     given(
         "a rotor without mass",
@@ -77,7 +78,7 @@ def test_names_that_are_alike_pass(good_text, load_text, names):
 
 
 ZONES = [
-    edit("zone that overlaps the next", 'end = "13 mm"', 'end = "26 mm"', "38:1", f"{A}.zone.far.begin"),
+    edit("zone that overlaps the next", 'end = "13 mm"', 'end = "26 mm"', "41:1", f"{A}.zone.far.begin"),
     given("zone around the next", "zone.near.end=31 mm", key="zone.near.end"),
     given("zones that begin together", "zone.near.begin=25 mm", "zone.near.end=30 mm", key="zone.near.end"),
     given("zone that ends before it begins", "zone.near.end=9 mm", key="zone.near.end"),
