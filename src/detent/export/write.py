@@ -12,6 +12,7 @@ from detent import __version__
 from detent.axis import Axis
 from detent.errors import DetentError, InputError
 from detent.export.code import FLAGS, as_json, seconds, texts
+from detent.export.serial import serial_texts
 from detent.export.translate.program import Program
 from detent.export.translate.values import RefusedError
 from detent.export.unit import options_of, outside_ranges, unit_of
@@ -74,10 +75,8 @@ def export_firmware(
         got = f"{path} = {value}"
         raise RefusedError("FW12", None, got, f"{lo} to {hi}", "change the axis file until the value fits")
     program = unit.translated(golden.params)
-    made: dict[str, bytes] = {
-        name: text.encode()
-        for name, text in texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)).items()
-    }
+    code = texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)) | serial_texts(axis, unit, axis.name)
+    made: dict[str, bytes] = {name: text.encode() for name, text in code.items()}
     made["vectors/job.vec"] = golden.vectors()
     manifest = _manifest(axis, loaded.name, golden, program)
     made["README.md"] = readme(manifest, unit.name, seconds(axis.simulated.tick)).encode()
