@@ -5,6 +5,7 @@ import math
 import mmap
 import os
 import random
+import re
 import shutil
 import signal
 import socket
@@ -33,6 +34,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests import (
+    live_board,
     live_course,
     live_drive,
     live_faults,
@@ -3205,3 +3207,100 @@ def test_21_the_first_motion_is_held_to_a_tenth_of_the_speed(name: str) -> None:
     ways = np.abs(np.diff(seen))
     speeds = np.convolve(ways, np.ones(10), "valid") / (10 * bench.loop.period * 1e-9)
     assert 0.04 * top < max(speeds) <= 0.125 * top
+@live_board.needs_cc
+@pytest.mark.wide
+@pytest.mark.process
+def test_31_a_board_is_led_over_a_serial_line_as_a_drive_is():
+    """Jog, stop and homing on the exported controller; what is commanded is where the machine goes."""
+    with live_board.on_board() as (bench, drive):
+        facts = {fact.name: fact.value for fact in bench.host.link.facts}
+        assert "as the axis file gives it" in facts["firmware"]
+        bench.pass_time(0.02)
+        assert bench.do(ops.ENABLE).how == ops.DONE
+        assert bench.do(ops.CONFIRM).how == ops.DONE
+        assert bench.do(ops.HOME).how == ops.DONE
+        assert bench.operation.trust == ops.REFERENCED
+        machine = drive.board.plant.state.plant.machine
+        assert abs(machine.motor.position - bench.answer.position) < 5e-6
+        jog = bench.host.ask(ops.JOG, 0.1)
+        bench.pass_time(0.15)
+        assert machine.motor.velocity == pytest.approx(0.1, rel=0.02)
+        bench.pass_time(LEASE)  # nobody keeps it
+        assert bench.host.ending(jog) == Ending(jog, ops.FAILED, ops.LEASE_LOST, 0)
+        bench.host.ask(ops.MOVE_TO, 0.2)
+        bench.pass_time(0.1)
+        bench.host.stop()
+        bench.pass_time(0.3)
+        assert abs(machine.motor.velocity) < 1e-4
+        assert bench.do(ops.MOVE_TO, 0.1).how == ops.DONE
+        assert abs(machine.motor.position - 0.1) <= bench.spec.method.in_position
+        bench.do(ops.OFF)
+        bench.host.run(2)
+        assert drive.board.plant.state.lines.enable == 0
+
+
+@live_board.needs_cc
+@pytest.mark.wide
+@pytest.mark.process
+def test_31_a_board_on_a_bad_line_is_led_as_on_a_good_one():
+    live_board.lead_on_bad_line(6_000)
+
+
+@live_board.needs_cc
+@pytest.mark.long
+@pytest.mark.process
+def test_31_a_board_takes_a_hundred_thousand_frames_of_a_bad_line():
+    live_board.lead_on_bad_line(50_000)
+
+
+@live_board.needs_cc
+@pytest.mark.wide
+@pytest.mark.process
+@pytest.mark.parametrize("cut", ["both", "to", "from"])
+def test_30_a_cut_serial_line_brings_the_axis_to_rest_and_nothing_resumes(cut):
+    """Led by nobody the board slows down by itself; told to let go, or at rest, it has no torque."""
+    with live_board.on_board() as (bench, drive):
+        live_board.ready_on(bench)
+        move = bench.host.ask(ops.MOVE_BY, 0.2)
+        bench.pass_time(0.2)
+        machine, lines = drive.board.plant.state.plant.machine, drive.board.plant.state.lines
+        assert machine.motor.velocity > 0.3
+        drive.cut, drive._wait, begun = cut, 1e-4, bench.loop.periods
+        while bench.operation.fault == 0:
+            bench.host.run(1)
+        assert (bench.loop.periods - begun) * live_board.SAMPLE <= drive.silence + 2e-3
+        assert (bench.operation.fault, bench.host.axis.state.lines.enable) == (DRIVE_LOST, 0)
+        assert bench.host.ending(move) == Ending(move, ops.FAILED, DRIVE_LOST, 0)
+        speed, place = machine.motor.velocity, machine.motor.position
+        bench.pass_time(0.15)
+        assert lines.enable == 0
+        if cut == "both":  # it hears nothing, and comes to rest by the acceleration of the file
+            assert abs(machine.motor.velocity) < 1e-3
+            way = machine.motor.position - place
+            assert way == pytest.approx(speed**2 / (2 * bench.spec.limits.acceleration), rel=0.2)
+        drive.cut, drive._wait = "", 1.0
+        bench.pass_time(0.1)
+        assert (bench.host.state, lines.enable) == ("fault", 0)
+        assert bench.do(ops.RESET).how == ops.DONE
+        bench.pass_time(0.02)
+        assert lines.enable == 0
+        live_board.ready_on(bench)
+        assert moved(bench)[0].how == ops.DONE
+
+
+@live_board.needs_cc
+@pytest.mark.wide
+@pytest.mark.process
+def test_32_another_board_or_another_firmware_is_not_enabled():
+    with live_board.on_board('hardware.id="serial slide 8"') as (bench, drive):
+        session = Session(bench.host, {})
+        bench.pass_time(0.02)
+        ended = session.wait(session.ask("enable"))
+        assert (ended.how, ended.code) == ("refused", OTHER_HARDWARE)
+        assert {"serial slide 7", "serial slide 8"} <= {*re.findall(r"serial slide \d", ended.reason)}
+        assert drive.board.plant.state.lines.enable == 0
+    with (
+        pytest.raises(DetentError, match=r"F66.*export firmware"),
+        live_board.on_board(live_board.HARDWARE, "method.position_gain=30"),
+    ):
+        pass

@@ -23,7 +23,10 @@ from detent.units import format_quantity
 File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=False)]
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
 PERIOD = "Time between two periods of the loop; a machine without real-time priority may need a longer one."
-DRIVE = "What is at the other end of the lines: sim, or canopen:INTERFACE:CHANNEL@NODE, as canopen:socketcan:can0@5."
+DRIVE = (
+    "What is at the other end of the lines: sim; canopen:INTERFACE:CHANNEL@NODE, as canopen:socketcan:can0@5; or a "
+    "board, serial:PORT, as serial:/dev/ttyACM0."
+)
 FOR = "End after so many seconds by itself."
 STORE = "Where to keep what survives; by default beside the axis file."
 NO_STORE = "Keep nothing: a simulated axis then begins where its file puts it."

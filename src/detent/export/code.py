@@ -41,13 +41,13 @@ class InC:
     float: bool
 
 
-def template(file: str, **given: Any) -> str:
-    """One file of the export from its template."""
+def template(file: str, package: Any = "detent.export", **given: Any) -> str:
+    """One file of the export from its template in a package."""
     environment = Environment(  # noqa: S701 - C, no HTML
         undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["comment"] = comment_of
-    text = resources.files("detent.export").joinpath(file).read_text(encoding="utf-8")
+    text = resources.files(package).joinpath(file).read_text(encoding="utf-8")
     return environment.from_string(text).render(**given)
 
 

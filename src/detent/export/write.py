@@ -13,6 +13,7 @@ from detent.axis import Axis
 from detent.errors import DetentError, InputError
 from detent.export.code import FLAGS, as_json, drawn_text, seconds, texts
 from detent.export.drawn import FILES, ROUNDS, Chance, drawn_vectors
+from detent.export.serial import serial_texts
 from detent.export.translate.program import Program
 from detent.export.translate.values import RefusedError
 from detent.export.unit import options_of, outside_ranges, unit_of
@@ -89,10 +90,8 @@ def export_firmware(  # noqa: PLR0913 - an axis, and what its vectors are made o
         got = f"{path} = {value}"
         raise RefusedError("FW12", None, got, f"{lo} to {hi}", "change the axis file until the value fits")
     program = unit.translated(golden.params)
-    made: dict[str, bytes] = {
-        name: text.encode()
-        for name, text in texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)).items()
-    }
+    code = texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)) | serial_texts(axis, unit, axis.name)
+    made: dict[str, bytes] = {name: text.encode() for name, text in code.items()}
     chance = Chance(unit, program, golden.params)
     made[f"{unit.name}_drawn.c"] = drawn_text(chance).encode()
     made["vectors/job.vec"] = golden.vectors()

@@ -159,6 +159,20 @@ class Wiring:
     largest: float  # magnitude of the demand
     sample: float  # time between two exchanges [s]
     hardware: str  # what the axis file says that the drive says of itself; empty where it says nothing
+    mode: str = "torque"  # what is demanded: a torque, a "velocity" [m/s] or a "position" [m]
+    zero: str = ""  # of a position demand: the position of count 0 [m]
+    samples: str = ""  # takes the number of samples that were heard of; none where nobody asks
+    firmware: bytes = b""  # parameters of the controller, where the other end may run it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Board:
+    """How its controller on a board is led over a serial line: a part of the export."""
+
+    lines: "type[Registers]"  # what goes to and fro
+    code: str  # of the board, a template in its package
+    places: Mapping[str, str]  # in that code, of the lines that are none of the controller
+    values: Callable[[Any], Mapping[str, float]]  # ``values(spec)``: constants of that code
 
 
 class Leg(NamedTuple):
@@ -248,13 +262,15 @@ class Method(Protocol[SpecT]):
     """Place of what makes it live: ``live(spec, operation)`` gives a `Live` by the name of each motor, by "" where
     there is one only; none where it has no operator."""
     wires: ClassVar[str] = ""
-    """Place of what lets its controller run on a drive: ``wired(spec, operation)`` gives a `Live` without a plant and
-    its `Wiring`, by the name of each motor."""
+    """Place of what lets its controller run on a drive: ``wired(spec, operation, mode)`` gives a `Live` without a plant
+    and its `Wiring`, by the name of each motor; the mode is what the drive is told, as in `Wiring`."""
     machines: ClassVar[str] = ""
-    """Place of the other half, the drive's amplifier and what it moves: ``machine(spec)`` gives a `Plant` and the same
-    `Wiring`, by the name of each motor."""
+    """Place of the other half, the drive's amplifier and what it moves: ``machine(spec, mode)`` gives a `Plant` and
+    the same `Wiring`, by the name of each motor."""
     actions: ClassVar[tuple[str, ...]] = ()
     """Steps of its `controller` that firmware has beside a tick of it, the first puts it on; none where it has none."""
+    boards: ClassVar[str] = ""
+    """Place of how that firmware is led over a serial line, a `Board`; none where it is not."""
     linear_loops: ClassVar[str] = ""
     """Place of its loops as linear systems, by where they are cut open: ``loops(spec)``; none where none is linear."""
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
@@ -384,13 +400,15 @@ class Method(Protocol[SpecT]):
         """One motor at power-on, to be operated; by its name where the file has several."""
         return self._of_motor(self.brought(self.lives)(spec, operation), spec, motor)
 
-    def wired(self, spec: SpecT, operation: Callable[..., Any], motor: str = "") -> "tuple[Live, Wiring]":
+    def wired(
+        self, spec: SpecT, operation: Callable[..., Any], motor: str = "", mode: str = "torque"
+    ) -> "tuple[Live, Wiring]":
         """The controller of one motor alone, to be operated on a drive."""
-        return self._of_motor(self._half(self.wires, spec)(spec, operation), spec, motor)
+        return self._of_motor(self._half(self.wires, spec)(spec, operation, mode), spec, motor)
 
-    def machine(self, spec: SpecT, motor: str = "") -> "tuple[Plant, Wiring]":
+    def machine(self, spec: SpecT, motor: str = "", mode: str = "torque") -> "tuple[Plant, Wiring]":
         """What stands at the other end of its lines: amplifier and mechanics of the file."""
-        return self._of_motor(self._half(self.machines, spec)(spec), spec, motor)
+        return self._of_motor(self._half(self.machines, spec)(spec, mode), spec, motor)
 
     def _half(self, place: str, spec: SpecT) -> Callable[..., Any]:
         if not place:

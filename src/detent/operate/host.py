@@ -146,7 +146,7 @@ class Host:
         if driver is None:
             self.axis: Live = method.live(spec, make, motor)
         else:
-            self.axis, wiring = method.wired(spec, make, motor)
+            self.axis, wiring = method.wired(spec, make, motor, driver.mode)
             if not math.isclose(wiring.sample, period):
                 raise DetentError(
                     f"{spec.axis.name}: got a loop of {period * 1e3:g} ms on a drive, and samples of "

@@ -109,6 +109,8 @@ def live(  # noqa: PLR0913 - as `make_host`
     speed: float = 1.0,
     wall: bool = True,
     store: Path | str | None = "",
+    period: float = PERIOD,
+    drive: str = SIMULATED,
 ) -> LiveAxis:
     """Run the axis of a file live, in this process.
 
@@ -127,6 +129,10 @@ def live(  # noqa: PLR0913 - as `make_host`
     store : path, optional
         Where it keeps what survives; by default beside the axis file, of a packaged example nowhere. None: nothing is
         kept, and the axis begins where its file puts it.
+    period : float, optional
+        Time between two periods of the loop [s]; on a drive its samples.
+    drive : str, optional
+        What is at the other end of the lines, as ``--drive`` of ``detent live`` takes it; default: the simulated plant.
 
     Returns
     -------
@@ -134,12 +140,14 @@ def live(  # noqa: PLR0913 - as `make_host`
         To be used in a ``with`` block, behind which the axis is at rest and without torque.
     """
     where = beside(file) if store == "" else store
-    host, name = make_host(file, overrides, motor=motor, speed=speed, wall=wall, store=where)
+    host, name = make_host(
+        file, overrides, motor=motor, speed=speed, wall=wall, store=where, period=period, drive=drive
+    )
     if wall:
         host.start()
     else:
         host.run_until_ready()
-    return LiveAxis(Session(host, {"name": name, "file": str(file), "simulated": True, "speed": speed}))
+    return LiveAxis(Session(host, {"name": name, "file": str(file), "simulated": host.link is None, "speed": speed}))
 
 
 def connect(file: Path | str) -> LiveAxis:

@@ -6,12 +6,13 @@ the loop goes by what it knows; a drive that it has heard nothing of for too lon
 """
 
 import ctypes
+import zlib
 from typing import Any
 
 from detent.control.operation import Operation, fail, lose_torque
 from detent.errors import DRIVE_LOST
 from detent.kernel.compiled import byte_at, put_byte
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, i2_array, i8, register, u1, u1_array, u2
+from detent.kernel.registers import CONTROLLER, PLANT, Leaf, Registers, i2_array, i8, register, u1, u1_array, u2
 from detent.kernel.step import step
 from detent.record.recorder import byte_places
 
@@ -88,6 +89,21 @@ def give_lines(w: Wires, o: Operation, lines: Any) -> None:
         w.output[first + k] = byte_at(lines, w.out_at[k])
     w.sum = sum_up(number, 0, w.output, first, w.outs)
     w.given = number
+
+
+def struct_code(leaf: Leaf) -> str:
+    """A register as `struct` packs it.
+
+    >>> [struct_code(leaf) for leaf in Wires.leaves()][:3]
+    ['B', 'q', 'q']
+    """
+    code = {"i1": "b", "i2": "h", "i4": "i", "i8": "q", "f4": "f", "f8": "d"}.get(leaf.width.code)
+    return code or {"u1": "B", "u2": "H", "u4": "I"}[leaf.width.code]
+
+
+def wire_hash(lines: type[Registers]) -> int:
+    """Of names, widths and writers of lines that go over a wire: both ends must have the same."""
+    return zlib.crc32("\n".join(f"{leaf.path} {leaf.width.code} {leaf.by}" for leaf in lines.leaves()).encode())
 
 
 _sum: Any = getattr(sum_up, "py_func", sum_up)  # a driver compiles nothing

@@ -7,7 +7,16 @@ answer.
 
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference
 from detent.control.cascade_law import control as control_law
-from detent.control.guard import Guard, GuardParams, is_overdue, lasting, watch, watch_number, weigh_effort
+from detent.control.guard import (
+    Guard,
+    GuardParams,
+    enable_guard,
+    is_overdue,
+    lasting,
+    watch,
+    watch_number,
+    weigh_effort,
+)
 from detent.control.supervision import Supervision, SupervisionParams, supervise, warm_up
 from detent.kernel.loop import HostArray, controls, f8_signal
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
@@ -106,6 +115,14 @@ def power_on(p: CascadeControllerParams, c: CascadeController, lines: CascadeLin
     stand_sensor(p.load_sensor, c.load_sensor, lines.load)
     c.reference.position, c.count = position, lines.motor.count
     c.on = c.known = lines.enable = lines.sync = 1
+
+
+@step
+def engage(c: CascadeController) -> None:
+    """The loops are closed where the axis is, and what the guard has seen is forgotten."""
+    c.law.integral = 0.0
+    enable_guard(c.guard)
+    c.on = 1
 
 
 # ---- a sample

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from detent.control.guard import FOLLOWING, JUMPED, OVERSPEED, SATURATED, STUCK, enable_guard
+from detent.control.guard import FOLLOWING, JUMPED, OVERSPEED, SATURATED, STUCK
 from detent.control.guard import TRAVEL as END_OF_TRAVEL
 from detent.control.homing import FAILED, FOUND, GIVE_WAY, IDLE, Homing, HomingParams, Seen, begin, is_pressed, seek
 from detent.control.homing import HALT as HALT_NOW
@@ -33,7 +33,7 @@ from detent.kernel.loop import lay_ready, serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
 from detent.methods.cascade.build import homing_params, motion_limits
-from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines
+from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines, engage
 from detent.methods.cascade.faults import places
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.run import describe_cause
@@ -124,9 +124,7 @@ def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Ope
     if d.do == REST_OFF:
         c.on = 0
     elif d.do == HOLD:
-        c.law.integral = 0.0
-        enable_guard(c.guard)
-        c.on = 1
+        engage(c)
     elif d.do == TRAVEL:
         set_limits(q, c, memory, o)
         why = go_to(memory.limits, memory.course, d.target)

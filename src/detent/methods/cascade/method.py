@@ -29,7 +29,7 @@ class CascadeMethod(Method[CascadeSpec]):
     senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:Cascade", "system:CascadeParams"
-    actions = ("power_on",)
+    actions = ("power_on", "engage")
     signals = "run:CASCADE_SIGNALS"
     timing = (
         "controller.left", "controller.reference.position", "lines.motor.count", "controller.motor_sensor.velocity",
@@ -46,7 +46,7 @@ class CascadeMethod(Method[CascadeSpec]):
         "Neglected: saturation, quantization, Coulomb and Stribeck friction; both masses move, backlash is closed.",
     )
     lives = "live:live"
-    wires, machines = "wired:wired", "wired:machine"
+    wires, machines, boards = "wired:wired", "wired:machine", "led:BOARD"
     compares = ("comparison:compare_profiles",)
     reports = "page:cascade_page"
     says = "{job}: every move was in position on {axis}.", "Not done: {failure}"

@@ -9,8 +9,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from detent.control.operation import OperationParams
 from detent.errors import DetentError
 from detent.kernel.loop import HostArray, advance, ticks
@@ -19,13 +17,12 @@ from detent.kernel.step import hot_step
 from detent.methods.cascade.build import build_cascade
 from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines, control
 from detent.methods.cascade.host import CascadeHost
+from detent.methods.cascade.led import NO_ROWS, led, led_machine
 from detent.methods.cascade.live import live_of
 from detent.methods.cascade.plant import CascadePlant, CascadePlantParams, latch_both, move, sense
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.method import Live, Plant, Wiring
 from detent.plant.two_mass import stand_masses
-
-NO_ROWS = np.zeros((1, 0), np.uint8), np.zeros(0, np.int64), 0
 
 
 class WiredCascadeParams(Registers):
@@ -102,8 +99,12 @@ def wiring(spec: CascadeSpec) -> Wiring:
     )  # fmt: skip
 
 
-def wired(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[str, tuple[Live, Wiring]]:
-    """The controller at power-on, its drive off, to be operated."""
+def wired(
+    spec: CascadeSpec, operation: Callable[..., OperationParams], mode: str = "torque"
+) -> dict[str, tuple[Live, Wiring]]:
+    """The controller at power-on, its drive off, to be operated; its loops are here, or in the drive."""
+    if mode != "torque":
+        return {"": led(spec, operation, mode)}
     host, lines = CascadeHost(spec), wiring(spec)
     live = live_of(host, operation)
     state = WiredCascade(controller=host.controller, lines=host.state.lines)
@@ -112,8 +113,10 @@ def wired(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[
     return {"": (replace(live, params=params, state=state), lines)}
 
 
-def machine(spec: CascadeSpec) -> dict[str, tuple[Plant, Wiring]]:
+def machine(spec: CascadeSpec, mode: str = "torque") -> dict[str, tuple[Plant, Wiring]]:
     """Amplifier and mechanics at rest; the first sample of the delay passes on the way to them."""
+    if mode != "torque":
+        return {"": led_machine(spec, mode)}
     built, lines = build_cascade(spec), wiring(spec)
     params, state = CascadeMachineParams(plant=built.plant), CascadeMachine()
     params.plant.source.delay -= 1

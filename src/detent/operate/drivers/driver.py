@@ -18,7 +18,10 @@ from detent.errors import OTHER_HARDWARE, DetentError
 from detent.methods.method import Wiring
 from detent.operate.wires import Ends
 
-DRIVERS = {"canopen": "detent.operate.drivers.canopen_drive:CanopenDrive"}
+DRIVERS = {
+    "canopen": "detent.operate.drivers.canopen_drive:CanopenDrive",
+    "serial": "detent.operate.drivers.serial_drive:SerialDrive",
+}
 SIMULATED = "sim"
 STALE = 0.1  # time in which the loop must have said something, or the drive loses its enable [s]
 
@@ -39,6 +42,7 @@ class Fact:
 class Driver(Protocol):
     """The lines of one motor as its drive has them."""
 
+    mode: str  # what it is told, as in `Wiring`
     hardware: str  # what the drive says of itself, once it is open
     silence: float  # time without a word from it that is a fault [s]
     ready: bool  # it waits for its enable, or has it
@@ -54,6 +58,10 @@ class Driver(Protocol):
 
     def write(self, lines: Any, *, reset: bool) -> None:
         """Tell the drive what the controller writes on the lines; `reset`: it may leave a fault of its own."""
+        ...
+
+    def counted(self) -> list[Fact]:
+        """What has happened on the way to it since; nothing where nobody counts."""
         ...
 
     def close(self) -> None:
@@ -90,11 +98,16 @@ class Link:
 
     def __init__(self, driver: Driver, wiring: Wiring, wires: Any) -> None:
         self.driver, self.wanted, self._wires, self._wiring = driver, wiring.hardware, wires, wiring
-        self.facts = driver.open(wiring)
+        self._facts = driver.open(wiring)
         self._ends = Ends(wires, wiring.lines, driver.silence)
         self._said, self._quiet = 0, 0
         self._left = threading.Event()
         self._thread: threading.Thread | None = None
+
+    @property
+    def facts(self) -> list[Fact]:
+        """Of the drive, and of the way to it so far."""
+        return self._facts + self.driver.counted()
 
     @property
     def bar(self) -> int:
@@ -122,7 +135,8 @@ class Link:
         self._ends.hear()
         if self._quiet * self._wiring.sample > STALE:  # nobody steers
             put(lines, self._wiring.enable, 0)
-            put(lines, self._wiring.demand, 0.0)
+            if self._wiring.mode != "position":
+                put(lines, self._wiring.demand, 0.0)
         self.driver.write(lines, reset=self._wires.state not in (FAULT, FAULT_REACTION))
         if self.driver.read(lines):
             self._ends.say(self.bar, self.driver.fault)
