@@ -205,7 +205,8 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
         if value.width is not None
     ]
     given = {
-        "name": name, "NAME": name.upper(), "version": __version__, "about": about, "tick": tick, "large": LARGE,
+        "name": name, "NAME": name.upper(), "begins": unit.begins, "version": __version__,
+        "about": about, "tick": tick, "large": LARGE,
         "source_hash": source_hash, "axis_hash": short_hash(bytes(params)), "layout_hash": f"{unit.layout_hash:08X}",
         "structs": struct_texts(program, (unit.params, unit.controller, unit.lines)), "signals": signals_text(program),
         "prototypes": "".join(_prototype(program, f) for f in program.steps.values() if f.entry),

@@ -30,6 +30,12 @@ class ControlUnit:
     controller: type[Registers]
     lines: type[Registers]
     entries: Mapping[str, Callable[..., Any]]  # by their names in C: the tick first, then what the host does
+    motor: str = ""  # which of several motors of the axis it moves
+
+    @property
+    def begins(self) -> str:
+        """Name in C of the step that puts it on."""
+        return list(self.entries)[1]
 
     @cached_property
     def leaves(self) -> tuple[Leaf, ...]:
@@ -85,14 +91,18 @@ def ranged(registers: Registers, prefix: str = "") -> Iterator[tuple[str, float,
                 yield f"{prefix}{field.name}" + (f"[{k}]" if field.length else ""), one, field.range
 
 
-def unit_of(axis: Axis, prefix: str = "") -> ControlUnit:
-    """The control unit of an axis; refused where its method has none (FW01), or the prefix is no name in C (FW13)."""
+def unit_of(axis: Axis, prefix: str = "", motor: str = "") -> ControlUnit:
+    """The control unit of an axis, or of one of its motors.
+
+    Refused where its method has none (FW01), or the prefix is no name in C (FW13).
+    """
     method = axis.method
     if not method.actions:
         able = ", ".join(name for name, one in METHODS.items() if one.actions)
         got = f"{axis.name}, an axis of the method {method.name}"
         raise RefusedError("FW01", None, got, f"one of {able}", "export an axis of such a method")
-    name = prefix or re.sub(r"\W+", "_", axis.name.lower(), flags=re.ASCII).strip("_") or "axis"
+    motor = method.motor(axis.spec, motor)
+    name = prefix or re.sub(r"\W+", "_", (motor or axis.name).lower(), flags=re.ASCII).strip("_") or "axis"
     name = name if prefix or not name[0].isdigit() else f"axis_{name}"
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or name in C_WORDS:
         raise RefusedError("FW13", None, f"the prefix {name!r}", "a name in C", "name another with --prefix")
@@ -102,5 +112,5 @@ def unit_of(axis: Axis, prefix: str = "") -> ControlUnit:
     if params is None or controller is None or lines is None:
         raise DetentError(f"{axis.name}: the method {method.name} has no controller of its own; name another axis")
     steps = {f"{name}_control": control_of(params)}
-    steps |= {f"{name}_{action}": method.brought(f"controller:{action}") for action in method.actions}
-    return ControlUnit(name, params, controller, lines, steps)
+    steps |= {f"{name}_{one}": method.brought(f"controller:{one}") for one in (*method.actions, *method.interrupts)}
+    return ControlUnit(name, params, controller, lines, steps, motor)

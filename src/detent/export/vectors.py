@@ -41,7 +41,7 @@ class Golden:
     """A witness of a run: makes the vectors of its control unit."""
 
     def __init__(self, unit: ControlUnit, state: type[Registers], most: int) -> None:
-        self.unit, self.most, self.ticks = unit, most, 0
+        self.unit, self.motor, self.most, self.ticks = unit, unit.motor, most, 0
         self.params: Any = None
         self.hash = begin_hash()
         self.signals: list[tuple[int, int]] = []  # of each signal: its largest length, and bytes of an element

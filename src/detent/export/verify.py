@@ -245,8 +245,9 @@ def differences(folder: str | Path, axis: Axis, job: str | Path | None = None) -
         raise InputError.of_file(str(place), f"a folder without {MANIFEST}", "an export", "detent export firmware")
     with tempfile.TemporaryDirectory() as made:
         new = export_firmware(
-            axis, Path(made) / "new", job=job, prefix=manifest["name"], ticks=max(1, int(manifest["ticks"]))
-        )
+            axis, Path(made) / "new", job=job, motor=manifest["motor"], prefix=manifest["name"],
+            ticks=max(1, int(manifest["ticks"])),
+        )  # fmt: skip
         before, after = (_steps(one) for one in (place, new.folder))
         for step in sorted(before.keys() | after.keys()):
             if before.get(step) != after.get(step):

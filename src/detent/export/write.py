@@ -14,7 +14,7 @@ from detent.errors import DetentError, InputError
 from detent.export.code import FLAGS, as_json, seconds, texts
 from detent.export.translate.program import Program
 from detent.export.translate.values import RefusedError
-from detent.export.unit import options_of, outside_ranges, unit_of
+from detent.export.unit import ControlUnit, options_of, outside_ranges, unit_of
 from detent.export.vectors import Golden, record
 from detent.files.text import write_errors
 
@@ -31,8 +31,14 @@ class Exported:
     manifest: Mapping[str, Any]
 
 
-def export_firmware(
-    axis: Axis, folder: str | Path, *, job: str | Path | None = None, prefix: str = "", ticks: int = TICKS
+def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may be chosen
+    axis: Axis,
+    folder: str | Path,
+    *,
+    job: str | Path | None = None,
+    motor: str = "",
+    prefix: str = "",
+    ticks: int = TICKS,
 ) -> Exported:
     """Write the controller of an axis as C99, with golden vectors of a job.
 
@@ -44,8 +50,10 @@ def export_firmware(
         A folder that is empty, that holds an earlier export and nothing else, or that is not there.
     job : path, optional
         Job whose run gives the golden vectors; default: a short one of the method.
+    motor : str, optional
+        Which one, of an axis with several.
     prefix : str, optional
-        Of all names in C; default: from the name of the axis.
+        Of all names in C; default: from the name of the motor or the axis.
     ticks : int
         Ticks of the golden run at most, 1 or more.
 
@@ -65,7 +73,7 @@ def export_firmware(
     if ticks < 1:
         raise DetentError(f"--ticks: got {ticks}; expected: 1 or more; try: leave it out for {TICKS}")
     refuse_other_files(target)
-    unit = unit_of(axis, prefix)
+    unit = unit_of(axis, prefix, motor)
     loaded = axis.load_job(job) if job is not None else axis.method.trial_job(axis.spec)
     golden = record(unit, axis, loaded, ticks)
     if golden.params is None or golden.ticks == 0:
@@ -80,7 +88,7 @@ def export_firmware(
     }
     made["vectors/job.vec"] = golden.vectors()
     manifest = _manifest(axis, loaded.name, golden, program)
-    made["README.md"] = readme(manifest, unit.name, seconds(axis.simulated.tick)).encode()
+    made["README.md"] = readme(manifest, unit, seconds(axis.simulated.tick)).encode()
     manifest["files"] = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(made.items())}
     made[MANIFEST] = as_json(manifest).encode()
     _write(target, made)
@@ -90,7 +98,8 @@ def export_firmware(
 def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[str, Any]:
     """What an export was made from, and what is not proven of it."""
     return {
-        "detent": __version__, "name": golden.unit.name, "axis": axis.name, "method": axis.method.name, "job": job,
+        "detent": __version__, "name": golden.unit.name, "axis": axis.name, "motor": golden.unit.motor,
+        "method": axis.method.name, "job": job,
         "ticks": golden.ticks, "hash": f"{golden.hash.number:016x}", "flags": FLAGS,
         "values": {row.key: row.value for row in axis.check().rows},
         "options": {f"{one.__name__}.{key}": value for (one, key), value in options_of(golden.params).items()},
@@ -151,16 +160,17 @@ def _write(folder: Path, made: Mapping[str, bytes]) -> None:
         part.rename(folder)
 
 
-def readme(manifest: Mapping[str, Any], name: str, tick: str) -> str:
+def readme(manifest: Mapping[str, Any], unit: ControlUnit, tick: str) -> str:
     """One page: what to call when."""
-    return f"""# {manifest["axis"]} as firmware
+    name, whose = unit.name, f"Motor {unit.motor} of {manifest['axis']}" if unit.motor else manifest["axis"]
+    return f"""# {whose} as firmware
 
 Written by detent {manifest["detent"]} from an axis of the method {manifest["method"]}. C99, no heap, no globals.
 
 1. Compile `{name}.c` and `{name}_params.c` with `{manifest["flags"]}`. Never `-ffast-math`.
 2. At power-on: check `{name}_selftest() == 0` and `{name}_check_params(&{name}_defaults) == 0`, set a
    `{name}_controller` and a `{name}_lines` to zero bytes, write what the sensors show into the lines, and call
-   `{name}_power_on`.
+   `{unit.begins}`.
 3. Every {tick}: write the lines that the plant writes, call `{name}_control`, and put the others out. Calls with the
    same pointers must not interrupt one another; two axes have two sets of registers.
 4. `registers.csv` names every register and `params.csv` every parameter. A `{name}_params` in RAM may be exchanged

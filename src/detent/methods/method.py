@@ -255,6 +255,8 @@ class Method(Protocol[SpecT]):
     `Wiring`, by the name of each motor."""
     actions: ClassVar[tuple[str, ...]] = ()
     """Steps of its `controller` that firmware has beside a tick of it, the first puts it on; none where it has none."""
+    interrupts: ClassVar[tuple[str, ...]] = ()
+    """Steps of its `controller` that a tick of it calls, and that an interrupt of firmware may call in its place."""
     linear_loops: ClassVar[str] = ""
     """Place of its loops as linear systems, by where they are cut open: ``loops(spec)``; none where none is linear."""
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
@@ -395,6 +397,10 @@ class Method(Protocol[SpecT]):
                 "a drive has; run it live without --drive"
             )
         return self.brought(place)
+
+    def motor(self, spec: SpecT, motor: str) -> str:
+        """The name of a motor of the file, which is needed where it has several; empty where it has one without."""
+        return self._of_motor({name: name for name in self.sensors(spec)}, spec, motor)
 
     def _of_motor(self, motors: Mapping[str, T], spec: SpecT, motor: str) -> T:
         """What belongs to a motor; its name is needed where the file has several."""

@@ -22,6 +22,7 @@ AnyRecorder = Recorder | Capture  # what records a run: every n-th tick of all o
 class Witness(Protocol):
     """Sees every tick of a run, and what its host writes between two stretches of them."""
 
+    motor: str  # which of several it sees; empty where there is one
     rows: Bytes  # a row per tick, by its number modulo their count
     picks: Offsets
 

@@ -155,9 +155,22 @@ def test_an_earlier_export_is_replaced_and_other_files_are_not(axis, tmp_path):
         export_firmware(axis, place / "cascade_axis.h")
 
 
-def test_a_method_without_a_control_unit_is_refused():
-    with pytest.raises(RefusedError, match=r"FW01: .*zoom.*expected: one of .*cascade"):
-        unit_of(detent.load(detent.example("zoom.toml")))
+def test_a_method_without_a_control_unit_is_refused(axis, monkeypatch):
+    monkeypatch.setattr(type(axis.method), "actions", ())
+    with pytest.raises(RefusedError, match=r"FW01: .*cascade.*expected: one of .*phase_servo"):
+        unit_of(axis)
+
+
+def test_a_unit_is_of_one_motor():
+    zoom = detent.load(detent.example("zoom.toml"))
+    with pytest.raises(DetentError, match="got no motor; expected: one of group_a, group_b"):
+        unit_of(zoom)
+    unit = unit_of(zoom, motor="group_b")
+    assert (unit.name, unit.motor, unit.begins) == ("group_b", "group_b", "group_b_place")
+    assert list(unit.entries)[0::8] == ["group_b_control", "group_b_next_period"]
+    golden = record(unit, zoom, zoom.load_job(detent.example("zoom_sequence.toml")), 50)
+    assert (golden.motor, golden.ticks) == ("group_b", 50)
+    assert [length for length, _ in golden.signals] == [zoom.spec.stepper["group_b"].steps + 1] * 2
 
 
 @pytest.mark.parametrize("prefix", ["1st", "a b", "int", "ä"])
