@@ -173,7 +173,9 @@ Written by detent {manifest["detent"]} from an axis of the method {manifest["met
    `{unit.begins}`.
 3. Every {tick}: write the lines that the plant writes, call `{name}_control`, and put the others out. Calls with the
    same pointers must not interrupt one another; two axes have two sets of registers.
-4. `registers.csv` names every register and `params.csv` every parameter. A `{name}_params` in RAM may be exchanged
+4. Between two ticks the main program may call {", ".join(f"`{one}`" for one in unit.calls)}; their comments in
+   `{name}.h` say what for.
+5. `registers.csv` names every register and `params.csv` every parameter. A `{name}_params` in RAM may be exchanged
    between two ticks, by its pointer.
 
 The simulation handles what happened in a tick at its end: equal bits need the same calls in the same order.

@@ -38,6 +38,10 @@ class Witness(Protocol):
         """So many ticks have passed."""
         ...
 
+    def act(self, params: Any, state: Any, action: Callable[..., Any], args: tuple[Any, ...]) -> Any:
+        """The host does ``action(*args)``, and gets what that gives."""
+        ...
+
 
 class Machine(Generic[P, S]):
     """A simulated axis whose base tick lasts `tick` [s].
@@ -67,6 +71,13 @@ class Machine(Generic[P, S]):
     def time(self) -> float:
         """Simulated time since power-on [s]."""
         return self._clock.tick * self.tick
+
+    def act(self, action: Callable[..., Any], *args: Any) -> Any:
+        """Let the host do something to the controller: ``action(*args)``, and what that gives."""
+        r = self.recorder
+        if r is None or isinstance(r, Recorder | Capture):
+            return action(*args)
+        return r.act(self.params, self.state, action, args)
 
     def pass_time(self, seconds: float) -> None:
         """Let at most `seconds` pass (a tick at least); returns earlier when the axis waits for its host."""

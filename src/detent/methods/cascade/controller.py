@@ -5,9 +5,19 @@ itself: a fault takes the command away in that sample. A fault, or an axis in po
 answer.
 """
 
+from detent.control import guard
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference
 from detent.control.cascade_law import control as control_law
-from detent.control.guard import Guard, GuardParams, is_overdue, lasting, watch, watch_number, weigh_effort
+from detent.control.guard import (
+    Guard,
+    GuardParams,
+    await_arrival,
+    is_overdue,
+    lasting,
+    watch,
+    watch_number,
+    weigh_effort,
+)
 from detent.control.supervision import Supervision, SupervisionParams, supervise, warm_up
 from detent.kernel.loop import HostArray, controls, f8_signal
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
@@ -106,6 +116,58 @@ def power_on(p: CascadeControllerParams, c: CascadeController, lines: CascadeLin
     stand_sensor(p.load_sensor, c.load_sensor, lines.load)
     c.reference.position, c.count = position, lines.motor.count
     c.on = c.known = lines.enable = lines.sync = 1
+
+
+@step
+def guard_axis(c: CascadeController, on: u1) -> None:
+    """Faults switch off, or do not."""
+    c.guarded = on
+
+
+@step
+def begin(c: CascadeController) -> None:
+    """The next sample takes the first entry of what has been laid ready."""
+    c.entry = 0
+
+
+@step
+def arrive_within(c: CascadeController, samples: i8) -> None:
+    """The axis must be in position within so many samples: that, or a fault, is an event."""
+    c.within = 0
+    await_arrival(c.guard, samples)
+
+
+@step
+def take_event(c: CascadeController) -> int:
+    """The host's look at the event, which is answered by it: 0 none."""
+    event = c.event
+    c.event = 0
+    return event
+
+
+@step
+def coast(c: CascadeController) -> None:
+    """The drive goes off."""
+    c.on = 0
+
+
+@step
+def forget_peaks(c: CascadeController) -> None:
+    """A motion begins that has peaks of its own."""
+    c.peaks.following = c.peaks.command = 0.0
+    c.peaks.limited = 0
+
+
+@step
+def forget_following(c: CascadeController) -> None:
+    """Its reference stands: what follows has a peak of its own."""
+    c.peaks.following = 0.0
+
+
+@step
+def forget_conduct(c: CascadeController) -> None:
+    """A stretch begins that is to be judged for itself."""
+    guard.forget_conduct(c.guard)
 
 
 # ---- a sample

@@ -8,7 +8,7 @@ controller would know: the step counts. Whether the rotors followed is for an ob
 
 import ctypes
 import math
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -57,14 +57,19 @@ class StageMotor:
         self.p: Any = build_stepper(spec, name, self.tables)
         # ctypes gives every register its type at run time only.
         self.r: Any = Stepper()
-        switch_on(self.r, self.table.step_inside(self.table.mechanics.start_position), self.p.plant.rotor.step_angle)
         self.controller: Any = self.r.controller
         self.feed: tuple[Any, ...] = tables(self.tables.up.entries, self.tables.down.entries)
         self._witness, self._tick = witness, instant(spec)
-        self.machine = self._machine()
         self._every = 0  # ticks between two rows of a record
+        self.machine = self._machine()
+        start_at = self.table.step_inside(self.table.mechanics.start_position)
+        switch_on(self.r, start_at, self.p.plant.rotor.step_angle, self.machine.act)
         self.rows, self.picks = np.zeros((1, 1), np.uint8), np.zeros(0, np.int64)  # no record of it
         self.rested = 0.0  # when its last step was over [s], at the last event
+
+    def act(self, action: Callable[..., Any], *args: Any) -> None:
+        """Do something to the control unit."""
+        self.machine.act(action, self.controller, *args)
 
     @property
     def position(self) -> int:
@@ -126,7 +131,7 @@ class StageMotor:
         r, rule, self._every = self.r, self.controller.rule, every
         while r.tick < at and not (until_event and rule.event):
             if not until_event:
-                acknowledge(self.controller)
+                self.act(acknowledge)
             self.machine.pass_ticks(at - r.tick)
             if rule.event:
                 self.rested = self.controller.timer.expires / self.p.controller.timer.clock_hz
@@ -265,7 +270,7 @@ class StageHost:
             if leg.turn is not None:
                 second.move_start(leg.via)
                 second.move_stop(leg.target)
-            start(motor.controller, heading, int(leg.turn is not None))
+            motor.act(start, heading, int(leg.turn is not None))
 
     def wait(self, names: Collection[str]) -> None:
         """Wait until these motors have come to rest."""
@@ -297,12 +302,12 @@ class StageHost:
         """Move the stop extreme of a running motor when it passes a place; True if it lay too near."""
         motor = self.stage.motors[name]
         rule = motor.controller.rule
-        call_at(motor.controller, motor.table.step_inside(at))
+        motor.act(call_at, motor.table.step_inside(at))
         late = self.stage.wait_for([name], 1.0 + motor.longest)
-        call_at(motor.controller, NOWHERE)
+        motor.act(call_at, NOWHERE)
         if late or motor.resting:  # a fault of the rule, which the host sees when it waits for the end
             return False
-        acknowledge(motor.controller)
+        motor.act(acknowledge)
         ahead, behind = motor.along(rule.direction)
         edit = ahead.move_stop(motor.table.step_inside(to), rule.position, rule.index)
         behind.move_start(edit.stop)
@@ -318,9 +323,9 @@ class StageHost:
             table.move_stop(table.steps - table.start)
         reload = self.spec.controller.words == "reload"
         word = word_within(motor.table.hz(abs(jog.speed)), motor.p.controller.timer.clock_hz, reload=reload)
-        deflect(motor.p.controller, motor.controller, word, heading)
+        motor.machine.act(deflect, motor.p.controller, motor.controller, word, heading)
         self.stage.pass_time(jog.duration)
-        release(motor.controller)
+        motor.act(release)
         if not motor.resting:
             self.wait([jog.motor])
         self.goal[jog.motor] = motor.place
