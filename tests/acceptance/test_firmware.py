@@ -21,10 +21,13 @@ JOBS = {
     "phase_servo": "moves.csv",
     "rotary_table": "index_sequence.toml",
     "zoom": "zoom_sequence.toml",
+    "print_head": "letter.txt",
 }
 MOTORS = {"zoom": "group_a"}
 SHORT, LONG = 2_000, 20_000  # ticks
-WHOLE = {"zoom": 10_000_000}  # a tick of a stepper is a time step of its rotor: 20,000 are a twenty-fifth of a second
+LETTER = 267_489  # ticks
+WHOLE = {"zoom": 10_000_000, "print_head": 10_000_000}
+"""Jobs that are done to their end: 20,000 ticks of a stepper are 40 ms, and those of a print head do not print yet."""
 EMULATED = [name for name in TARGETS if not name.startswith("host-")]
 
 
@@ -78,6 +81,7 @@ def test_01_the_cascade_is_equal_here(exported):
 def test_01_10_19_each_is_equal_here_without_a_warning_or_anything_undefined(exported, method):
     folder = exported(method, WHOLE.get(method, LONG))
     assert read_manifest(folder)["ticks"] >= LONG
+    assert read_manifest(folder)["ticks"] == LETTER or method != "print_head"
     proven(folder, "host-gcc", "host-clang")
 
 
@@ -95,6 +99,13 @@ def test_02_03_04_each_is_equal_on_each_processor(exported, method):
 @pytest.mark.long
 def test_01_the_filtered_servo_is_equal_for_a_million_clocks(exported):
     proven(exported("filtered_servo", 100_000), "host-gcc", "cortex-m4")
+
+
+@pytest.mark.long
+def test_01_02_03_the_whole_letter_is_equal(exported):
+    folder = exported("print_head", WHOLE["print_head"])
+    assert read_manifest(folder)["ticks"] == LETTER
+    proven(folder, "host-gcc", "cortex-m0", "cortex-m4", "rv32")
 
 
 def test_12_ranges_hold_in_every_standard_job():

@@ -19,8 +19,10 @@ from detent.export.write import MANIFEST, changed_files, export_firmware, read_m
 TIMEOUT = 600.0  # of one replay [s]
 TRAPS = "-O1 -g -fsanitize=undefined,address -fno-sanitize-recover=all -DFIRMWARE_CHECK"
 ARM = "-mthumb -ffreestanding -nostartfiles"
-SMALL = {"code": "0x00000000", "code_length": "4M", "data": "0x20000000", "data_length": "4M"}
-LARGE = {"code": "0x80000000", "code_length": "64M", "data": "0x84000000", "data_length": "32M"}
+SMALL = {"code": "0x00000000", "code_length": "4M", "data": "0x20000000", "data_length": "4M",
+         "vectors": "0x21000000", "vectors_length": "16M"}  # fmt: skip
+LARGE = {"code": "0x80000000", "code_length": "64M", "data": "0x84000000", "data_length": "32M",
+         "vectors": "0x86000000", "vectors_length": "32M"}  # fmt: skip
 
 
 @dataclass(frozen=True)
