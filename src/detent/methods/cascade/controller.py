@@ -147,7 +147,7 @@ def take_event(c: CascadeController) -> int:
 
 @step
 def coast(c: CascadeController) -> None:
-    """The drive goes off."""
+    """Take the command away and let the axis coast."""
     c.on = 0
 
 
