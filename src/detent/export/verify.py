@@ -20,7 +20,7 @@ TIMEOUT = 600.0  # of one replay [s]
 TRAPS = "-O1 -g -fsanitize=undefined,address -fno-sanitize-recover=all -DFIRMWARE_CHECK"
 ARM = "-mthumb -ffreestanding -nostartfiles"
 SMALL = {"code": "0x00000000", "code_length": "4M", "data": "0x20000000", "data_length": "4M",
-         "vectors": "0x21000000", "vectors_length": "16M"}  # fmt: skip
+         "vectors_length": "16M"}  # fmt: skip
 LARGE = {"code": "0x80000000", "code_length": "64M", "data": "0x84000000", "data_length": "32M",
          "vectors": "0x86000000", "vectors_length": "32M"}  # fmt: skip
 
@@ -54,10 +54,12 @@ def _host(name: str, compiler: str, *more: str) -> Target:
     return Target(name, compiler, compiler, "-DON_HOST", ("-O0", "-O2", "-Os", *more))
 
 
-def _cortex(name: str, flags: str, board: str) -> Target:
+def _cortex(name: str, flags: str, board: str, vectors: str = "0x21000000") -> Target:
+    """A board, and where it has memory for vectors."""
     return Target(
         name, "arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi", f"{ARM} -mcpu={flags}",
-        emulator="qemu-system-arm", machine=f"-M {board}", emulator_package="qemu-system-arm", memory=SMALL,
+        emulator="qemu-system-arm", machine=f"-M {board}", emulator_package="qemu-system-arm",
+        memory=SMALL | {"vectors": vectors},
         libraries="-nostdlib -lm -lc -lgcc",
     )  # fmt: skip
 
@@ -69,7 +71,7 @@ TARGETS = {
         _host("host-clang", "clang"),
         _cortex("cortex-m0", "cortex-m0", "mps2-an385"),
         _cortex("cortex-m4", "cortex-m4", "mps2-an386"),
-        _cortex("cortex-m7", "cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard", "mps2-an500"),
+        _cortex("cortex-m7", "cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard", "mps2-an500", "0x60000000"),
         Target(
             "rv32", "riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf",
             "--specs=picolibc.specs -march=rv32imac -mabi=ilp32 -ffreestanding -nostartfiles",
