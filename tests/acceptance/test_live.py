@@ -3207,6 +3207,8 @@ def test_21_the_first_motion_is_held_to_a_tenth_of_the_speed(name: str) -> None:
     ways = np.abs(np.diff(seen))
     speeds = np.convolve(ways, np.ones(10), "valid") / (10 * bench.loop.period * 1e-9)
     assert 0.04 * top < max(speeds) <= 0.125 * top
+
+
 @live_board.needs_cc
 @pytest.mark.wide
 @pytest.mark.process

@@ -14,7 +14,6 @@ from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
 from tests.identify_files import columns_of, write_log
 from tests.live_browser import run_script
-from tests.standstill_rig import RIGID, both, drawn, example, rigid, told
 from tests.standstill_rig import RIGID, axis, both, drawn, example, rigid, told
 from tests.standstill_truth import AXES, PAGE, WITHIN, compare, each, hunting, truth_of, truths
 from tests.store_rig import QUESTION, fill, fill_killed, run_killed
@@ -962,6 +961,8 @@ def test_39_filtered_servos_fail_where_their_loop_is_unstable_and_friction_does_
     assert beyond.mean() == pytest.approx(unstable, abs=0.03)
     assert fails[beyond].mean() > 0.8
     assert fails[~beyond].mean() < 0.05
+
+
 @pytest.mark.process
 @pytest.mark.parametrize("verb", ["tune", "hunt", "tolerance"])
 def test_40_the_help_of_a_verb_loads_no_more_than_that_of_check(verb):
@@ -995,6 +996,8 @@ def test_40_reports_open_without_a_network_and_on_a_telephone(verb, tmp_path):
     assert seen["charts"] >= 3
     assert seen["wide"] == 360  # it does not scroll sideways
     assert axis.name in seen["heading"]
+
+
 FREE_EDGE = [*both(coulomb="0 N", static="0 N"), "encoder.resolution=10 um", "method.velocity_integral=0 V/m",
              "drive.command_step=0 V"]  # fmt: skip
 

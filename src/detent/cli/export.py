@@ -11,7 +11,8 @@ from detent.cli.app import NOT_DONE, File, Job, Json, Set, app, option
 from detent.cli.terminal import print_json, progress_bar, say, split_names, tell
 
 OUTPUT = "Folder for the export: a new one, an empty one, or that of an earlier export."
-PREFIX = "Prefix of all names in C. Default: from the name of the axis."
+MOTOR = "Which motor, of a file that has several."
+PREFIX = "Prefix of all names in C. Default: from the name of the motor or the axis."
 TICKS = "Ticks of the golden run at most."
 FILES = "Random register files that each function is called on."
 ROUNDS = "Ticks in which the host does anything and the lines show anything."
@@ -35,6 +36,7 @@ def export(
     file: File,
     output: Annotated[Path, option("--output -o", "FOLDER", OUTPUT)],
     job: Job = None,
+    motor: Annotated[str, option("--axis", "NAME", MOTOR)] = "",
     prefix: Annotated[str, option("--prefix", "NAME", PREFIX)] = "",
     ticks: Annotated[int, option("--ticks", "NUMBER", TICKS)] = 1_000_000,
     files: Annotated[int, option("--files", "NUMBER", FILES)] = 1000,
@@ -54,7 +56,9 @@ def export(
     axis = load(file, overrides or [])
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "simulating the job, translating the controller")
-        made = export_firmware(axis, output, job=job, prefix=prefix, ticks=ticks, files=files, rounds=rounds)
+        made = export_firmware(
+            axis, output, job=job, motor=motor, prefix=prefix, ticks=ticks, files=files, rounds=rounds
+        )
     found: dict[str, Any] = dict(made.manifest)
     if as_json:
         print_json(found | {"folder": str(made.folder)})

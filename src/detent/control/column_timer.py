@@ -7,7 +7,7 @@ differs is the column error. Positions in 1/256 emitter from the left frame, tim
 """
 
 from detent.kernel.registers import Registers, i4, i4_array, i8, register, u1, u1_array
-from detent.kernel.step import hot_step, step
+from detent.kernel.step import bounded, hot_step, step
 
 COLUMNS = 2048
 """Columns of the line buffer: 17 in at 120 per inch."""
@@ -38,10 +38,10 @@ class LineBuffer(Registers):
 class ColumnTimer(Registers):
     """State of the print timing of the running line."""
 
-    bank: u1 = register("bank of the line buffer that prints")
+    bank: u1 = register("bank of the line buffer that prints", range=(0, 1))
     active: u1 = register("1 while columns of the running line are still to be fired")
-    column: i4 = register("next column to fire")
-    end_column: i4 = register("last column of the line in the direction of motion")
+    column: i4 = register("next column to fire", range=(0, COLUMNS - 1))
+    end_column: i4 = register("last column of the line in the direction of motion", range=(0, COLUMNS - 1))
     lead: i4 = register("flight lead at the commanded speed, 1/256 emitter", unit="emitter/256")
     fire_us: i8 = register("time at which the next column fires; far future when none is due", unit="us")
     fired: i8 = register("columns printed so far", unit="count")
@@ -49,6 +49,7 @@ class ColumnTimer(Registers):
 
 
 @step
+@bounded(COLUMNS, "passes a column per turn")
 def skip_white(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
     """Advance to the next inked column; the line is done when there is none."""
     base = r.bank * COLUMNS
@@ -87,6 +88,7 @@ def next_column(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
 
 
 @hot_step
+@bounded(COLUMNS, "passes a column per turn, but for the last one")
 def schedule(
     p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, emitter: int, direction: int, now: int, interval: int
 ) -> None:

@@ -77,9 +77,12 @@ class Guard(Registers):
     conduct: Conduct = block("how the axis has behaved")
 
 
+@step
 def forget_conduct(g: Guard) -> None:
-    """A stretch begins that is to be judged for itself."""
-    g.conduct = Conduct()
+    """Host action: a stretch begins that is to be judged for itself."""
+    seen = g.conduct
+    seen.looks = seen.limited = seen.place = seen.lowest = seen.highest = seen.turns = 0
+    seen.heading = 0
 
 
 @step

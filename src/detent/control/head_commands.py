@@ -2,6 +2,7 @@
 
 from detent.control.feed_forward import run_up, stop_distance_up
 from detent.control.head_computer import (
+    BYTES,
     CONTROLLED_RUN,
     ILLEGAL,
     NO_OPERATION,
@@ -19,8 +20,8 @@ from detent.control.head_computer import (
 )
 from detent.control.head_motion import forget_drive
 from detent.control.latch import read_latch, send
-from detent.control.speed_selection import FLOOR, fits, select_speed, slower
-from detent.kernel.step import step
+from detent.control.speed_selection import FLOOR, HALVINGS, fits, select_speed, slower
+from detent.kernel.step import bounded, step
 
 ACKNOWLEDGE = 0xFF
 SLOWEST, FASTEST = 18, 240
@@ -34,9 +35,11 @@ CODES = (0x8D, 0x92, 0x99, 0xA2, 0x01, 0x40, 0x41)
 @step
 def operation_of(first: int) -> int:
     """Operation of a first byte; REFUSED when it is none."""
-    for k in range(len(CODES)):
-        if CODES[k] == first:
-            return PRINT + k
+    operation = PRINT
+    for code in CODES:
+        if code == first:
+            return operation
+        operation = min(operation + 1, REFUSED)
     return REFUSED
 
 
@@ -114,7 +117,7 @@ def receive_byte(p: HeadParams, c: HeadComputer) -> None:
             return
     else:
         r.left -= 1
-    r.buffer[r.count] = byte
+    r.buffer[min(r.count, BYTES - 1)] = byte
     r.count += 1
     if r.left > 0 or (p.ack_last and r.count > 1):
         send(c.status, ACKNOWLEDGE)
@@ -167,6 +170,7 @@ def print_distance(c: HeadComputer, start: int, end: int, origin: int, s: int) -
 
 
 @step
+@bounded(HALVINGS, "halves a speed value of 16 bits")
 def plan_print(p: HeadParams, c: HeadComputer, start: int, end: int, origin: int) -> None:
     """Print from `start` to `end`, crossed in the steady state: stop beyond the end, run-up before the start (3.4)."""
     q = c.plan

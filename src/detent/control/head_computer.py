@@ -48,6 +48,10 @@ QUEUE = 4
 """Commands that wait, the last place for refused ones; only one of them may be a motion command."""
 
 
+BYTES = 8
+"""Of a command at most: its first one tells of up to seven more."""
+
+
 class HeadOutputs(Registers):
     """What the axis computer hands to timer and decoder; taken over together at the next 25 kHz trigger."""
 
@@ -88,7 +92,7 @@ class Receiver(Registers):
 
     left: u1 = register("data bytes still to come", unit="count")
     count: u1 = register("bytes collected", unit="count")
-    buffer: u1_array = register("the bytes", unit="code", length=8)
+    buffer: u1_array = register("the bytes", unit="code", length=BYTES)
 
 
 class CommandQueue(Registers):
@@ -97,7 +101,7 @@ class CommandQueue(Registers):
     operation: i4_array = register("operation code", unit="code", length=QUEUE)
     start: i4_array = register("first argument; position of PRINT in 1/256 emitter", unit="emitter/256", length=QUEUE)
     end: i4_array = register("second argument", unit="emitter", length=QUEUE)
-    first: u1 = register("index of the oldest", unit="count")
+    first: u1 = register("index of the oldest", unit="count", range=(0, QUEUE - 1))
     waiting: u1 = register("how many wait", unit="count")
     motions: u1 = register("how many of them are motion commands", unit="count")
 

@@ -37,6 +37,7 @@ from detent.control.head_computer import (
     OBSTRUCTION,
     OK,
     POWER_ON,
+    QUEUE,
     REFUSED,
     RUNAWAY_US,
     SET_SPEED,
@@ -60,7 +61,7 @@ from detent.control.head_motion import (
 from detent.control.latch import pass_on, send
 from detent.control.self_identification import identify
 from detent.control.speed_selection import HIGH_SPEED
-from detent.kernel.step import hot_step, step
+from detent.kernel.step import bounded, hot_step, step
 
 BREAK_LOOSE_US = 1000
 """Homing without a speed trim: while the head stands, the drive rises one count per millisecond up to the homing limit.
@@ -88,6 +89,7 @@ def stand(p: HeadParams, c: HeadComputer, state: int) -> None:
 
 
 @step
+@bounded(QUEUE, "commands that wait")
 def fault(p: HeadParams, c: HeadComputer, code: int) -> None:
     """Drive off; the running command and all waiting ones are answered with the code."""
     stand(p, c, FAULT)
@@ -236,6 +238,7 @@ def finish(p: HeadParams, c: HeadComputer, code: int, turn: bool) -> None:
 
 
 @step
+@bounded(QUEUE, "commands that wait")
 def begin_next(p: HeadParams, c: HeadComputer, turn: bool) -> None:
     """Execute waiting commands until one moves the head; without one the drive is switched off."""
     while c.queue.waiting > 0:
@@ -443,14 +446,15 @@ def decide(p: HeadParams, c: HeadComputer) -> None:
         pass_on(c.status)
 
 
+@step
 def power_on(p: HeadParams, c: HeadComputer) -> None:
     """State after a reset: default constants, drive off."""
     c.state = POWER_ON
     c.wake_us = NEVER
     c.maximum = p.print_speed
     c.columns.fire_us = NEVER
-    for line in (c.right, c.left):
-        line.slope, line.friction = p.slope_default, p.friction_default
+    c.right.slope = c.left.slope = p.slope_default
+    c.right.friction = c.left.friction = p.friction_default
 
 
 __all__ = ["LOW_STEADY", "decide", "halt", "next_wake", "on_emitter", "on_reverse_edge", "power_on", "switch_off"]

@@ -18,8 +18,8 @@ class StatusPort(Registers):
 
     latch: Latch = block("the latch the supervisor reads")
     queue: u1_array = register("bytes that wait", unit="code", length=QUEUE_LENGTH)
-    first: u1 = register("index of the oldest waiting byte", unit="count")
-    waiting: u1 = register("number of waiting bytes", unit="count")
+    first: u1 = register("index of the oldest waiting byte", unit="count", range=(0, QUEUE_LENGTH - 1))
+    waiting: u1 = register("number of waiting bytes", unit="count", range=(0, QUEUE_LENGTH))
     lost: u1 = register("bytes lost because the supervisor did not read; must stay 0", unit="count")
 
 

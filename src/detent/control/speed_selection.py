@@ -1,9 +1,10 @@
 """Choice of the speed of a move from its distance (print-head specification 3.4)."""
 
-from detent.kernel.step import step
+from detent.kernel.step import bounded, step
 
 FLOOR = 30  # 5 in/s: the search does not go below it
 HIGH_SPEED = 60  # 10 in/s: from here on the high-speed algorithm
+HALVINGS = 15  # of a speed value of 16 bits at most
 
 
 @step
@@ -20,6 +21,7 @@ def slower(s: int, maximum: int) -> int:
 
 
 @step
+@bounded(HALVINGS, "halves a speed value of 16 bits")
 def select_speed(distance: int, maximum: int) -> int:
     """Speed value for a distance in emitters."""
     s = maximum

@@ -28,6 +28,7 @@ class StepRuleParams(Registers):
     limit: i4_array = register("word of each zone limit: frequency [Hz] or period [tick]", unit="count", length=LIMITS)
     index_mask: i4 = register("bits of an entry that hold the ramp index", unit="code", range=(0, RAMP - 1))
     zone_shift: u1 = register("place of the zone number in an entry", unit="bit", range=(11, 15))
+    last: i2 = register("last index of the ramp list", unit="count", range=(0, RAMP - 1))
     reload: u1 = register("1: words are periods, a larger one is slower", option=True)
     literal: u1 = register("1: the literal rule of the claim, without a limit on the change", option=True)
 
@@ -190,6 +191,7 @@ def next_step(p: StepRuleParams, r: StepRule, entry: int) -> int:
     return STEP
 
 
+@step
 def place_motor(r: StepRule, position: int) -> None:
     """Power-on or homing: the motor stands at `position` [step]."""
     r.position = position
@@ -199,7 +201,8 @@ def place_motor(r: StepRule, position: int) -> None:
     r.state = REST
 
 
-def start_move(r: StepRule, heading: int, turns: int = 0) -> None:
+@step
+def start_move(r: StepRule, heading: int, turns: int) -> None:
     """Start signal for an automatic move to the sentinel of a direction, with `turns` reversals on the way."""
     r.heading, r.turns, r.start, r.manual, r.event = heading, turns, 1, 0, 0
 
@@ -223,6 +226,7 @@ def release(r: StepRule) -> None:
     r.manual, r.request, r.request_word, r.event = 1, AT_REST, 0, 0
 
 
+@step
 def acknowledge(r: StepRule) -> None:
     """The host has seen the event: time may pass on."""
     r.event = 0

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from importlib import resources
-from typing import Any
+from typing import Any, get_args
 
 from jinja2 import Environment, StrictUndefined
 
@@ -19,7 +19,7 @@ from detent.export.translate.text import code_text, comment_of, signals_text, st
 from detent.export.translate.values import c_field, interval_of, number, type_of_local
 from detent.export.unit import LARGE, ControlUnit, members, ranged
 from detent.export.vectors import Golden
-from detent.kernel.registers import Field, Leaf, Registers, Width
+from detent.kernel.registers import Field, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
 
 FLAGS = "-std=c99 -ffp-contract=off"
 WARNINGS = (
@@ -205,8 +205,15 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
         )
         if value.width is not None
     ]
+    numbers = {width.code: width for width in (get_args(one)[1] for one in (u1, u2, u4, i1, i2, i4, i8, f8))}
+    calls = [
+        {"name": one, "takes": taken, "texts": list(_arguments(name, taken))}
+        for one, codes in unit.calls.items()
+        for taken in [[numbers.get(code, code) for code in codes]]
+    ]
     given = {
-        "name": name, "NAME": name.upper(), "version": __version__, "about": about, "tick": tick, "large": LARGE,
+        "name": name, "NAME": name.upper(), "begins": unit.begins, "version": __version__,
+        "about": about, "tick": tick, "large": LARGE,
         "source_hash": source_hash, "axis_hash": short_hash(bytes(params)), "layout_hash": f"{unit.layout_hash:08X}",
         "structs": struct_texts(program, (unit.params, unit.controller, unit.lines)), "signals": signals_text(program),
         "prototypes": "".join(_prototype(program, f) for f in program.steps.values() if f.entry),
@@ -217,7 +224,11 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
     initialiser = _initialiser(program, params)
     text = template("params.c.in", name=name, initialiser=initialiser)
     made[f"{name}_params.c"] = f"#include <math.h>\n{text}" if "INFINITY" in initialiser else text
-    replay = given | {"signals": signals, "leaves": leaves}
+    replay = given | {
+        "signals": signals, "leaves": leaves, "calls": calls,
+        "call_floats": any("f8" in codes for codes in unit.calls.values()),
+        "most_numbers": max(1, *(sum(not isinstance(code, str) for code in one["takes"]) for one in calls)),
+    }  # fmt: skip
     made[f"{name}_replay.c"] = template("replay.c.in", **replay)
     made["board.c"] = template("board.c.in", name=name)
     made["params.csv"] = table(parameters(program, params))
@@ -225,6 +236,20 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
     made["trace.csv"] = table(traced(program, made[f"{name}.c"]))
     made["build.mk"] = f"{name}_CFLAGS := {FLAGS}\n{name}_SOURCES := {name}.c {name}_params.c\n"
     return made
+
+
+def _arguments(name: str, taken: Iterable[str | Width]) -> Iterator[str]:
+    """Arguments of a call in the replay: registers, what is laid ready, and numbers as they came."""
+    numbers = signals = 0
+    for one in taken:
+        if isinstance(one, Width):
+            yield f"as_double(a[{numbers}])" if one.is_float else f"({one.c_name})a[{numbers}]"
+            numbers += 1
+        elif one == "signal":
+            yield f"laid{signals}_"
+            signals += 1
+        else:
+            yield {"params": f"&{name}_defaults", "controller": "&c_", "lines": "&l_"}[one]
 
 
 # ---- random vectors

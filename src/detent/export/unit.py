@@ -3,19 +3,20 @@
 Its state is the controller and its lines; the simulation calls the very steps that are translated.
 """
 
+import inspect
 import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 from detent.axis import Axis
 from detent.errors import DetentError
 from detent.export.translate.program import Program
 from detent.export.translate.values import C_WORDS, RefusedError
 from detent.kernel.loop import control_of
-from detent.kernel.registers import Field, Leaf, Registers
+from detent.kernel.registers import Field, Leaf, Registers, Width
 from detent.methods.registry import METHODS
 
 LARGE = 64  # elements of an array that enters the hash of every 1000th tick only if it has more
@@ -30,6 +31,18 @@ class ControlUnit:
     controller: type[Registers]
     lines: type[Registers]
     entries: Mapping[str, Callable[..., Any]]  # by their names in C: the tick first, then what the host does
+    motor: str = ""  # which of several motors of the axis it moves
+
+    @cached_property
+    def calls(self) -> dict[str, tuple[str, ...]]:
+        """What may be called beside the tick, by its name in C: what it takes, a class's name in C or a width."""
+        roots = {self.params: "params", self.controller: "controller", self.lines: "lines"}
+        return {name: tuple(arguments(step, roots)) for name, step in list(self.entries.items())[1:]}
+
+    @property
+    def begins(self) -> str:
+        """Name in C of the step that puts it on."""
+        return list(self.entries)[1]
 
     @cached_property
     def leaves(self) -> tuple[Leaf, ...]:
@@ -38,13 +51,30 @@ class ControlUnit:
 
     @cached_property
     def layout_hash(self) -> int:
-        """Of names, widths and order of the registers."""
-        return zlib.crc32("\n".join(f"{leaf.path} {leaf.width.code} {leaf.length}" for leaf in self.leaves).encode())
+        """Of names, widths and order of the registers, and of what may be called."""
+        rows = [f"{leaf.path} {leaf.width.code} {leaf.length}" for leaf in self.leaves]
+        rows += [f"{name.removeprefix(self.name)} {' '.join(taken)}" for name, taken in self.calls.items()]
+        return zlib.crc32("\n".join(rows).encode())
 
     def translated(self, params: Registers, tunable: bool = False) -> Program:  # noqa: FBT001, FBT002 - one switch
         """The unit in C, with the options of these parameters folded in unless they stay tunable."""
         roots = {self.params: "params", self.controller: "controller", self.lines: "lines"}
         return Program(self.name, self.entries, self.params, {} if tunable else options_of(params), roots)
+
+
+def arguments(step: Callable[..., Any], roots: Mapping[type[Registers], str]) -> Iterator[str]:
+    """What a step takes: registers by the names of `roots`, a signal laid ready as "signal", numbers by their width."""
+    plain = getattr(step, "py_func", step)
+    for name, hint in inspect.get_annotations(plain, eval_str=True).items():
+        width = next((one for one in get_args(hint)[1:] if isinstance(one, Width)), None)
+        if name == "return":
+            continue
+        if width is not None:
+            yield "signal" if get_args(hint)[0] is Any else width.code
+        elif hint in roots:
+            yield roots[hint]
+        else:
+            yield {float: "f8", bool: "u1"}.get(hint, "i8")
 
 
 def options_of(params: Registers) -> dict[tuple[type[Registers], str], float]:
@@ -85,18 +115,22 @@ def ranged(registers: Registers, prefix: str = "") -> Iterator[tuple[str, float,
                 yield f"{prefix}{field.name}" + (f"[{k}]" if field.length else ""), one, field.range
 
 
-def unit_of(axis: Axis, prefix: str = "") -> ControlUnit:
-    """The control unit of an axis; refused where its method has none (FW01), or the prefix is no name in C (FW13)."""
+def unit_of(axis: Axis, prefix: str = "", motor: str = "") -> ControlUnit:
+    """The control unit of an axis, or of one of its motors.
+
+    Refused where its method has none (FW01), or the prefix is no name in C (FW13).
+    """
     method = axis.method
     if not method.actions:
         able = ", ".join(name for name, one in METHODS.items() if one.actions)
         got = f"{axis.name}, an axis of the method {method.name}"
         raise RefusedError("FW01", None, got, f"one of {able}", "export an axis of such a method")
-    name = prefix or re.sub(r"\W+", "_", axis.name.lower(), flags=re.ASCII).strip("_") or "axis"
+    motor = method.motor(axis.spec, motor)
+    name = prefix or re.sub(r"\W+", "_", (motor or axis.name).lower(), flags=re.ASCII).strip("_") or "axis"
     name = name if prefix or not name[0].isdigit() else f"axis_{name}"
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or name in C_WORDS:
         raise RefusedError("FW13", None, f"the prefix {name!r}", "a name in C", "name another with --prefix")
-    return _unit(method, name)
+    return _unit(method, name, motor)
 
 
 def unit_named(method: str, name: str) -> ControlUnit | None:
@@ -105,12 +139,12 @@ def unit_named(method: str, name: str) -> ControlUnit | None:
     return _unit(found, name) if found is not None and found.actions else None
 
 
-def _unit(method: Any, name: str) -> ControlUnit:
+def _unit(method: Any, name: str, motor: str = "") -> ControlUnit:
     params = method.parameters().__fields__["controller"].block
     state = method.registers().__fields__
     controller, lines = state["controller"].block, state["lines"].block
     if params is None or controller is None or lines is None:
         raise DetentError(f"the method {method.name} has no controller of its own; name another axis")
     steps = {f"{name}_control": control_of(params)}
-    steps |= {f"{name}_{action}": method.brought(f"controller:{action}") for action in method.actions}
-    return ControlUnit(name, params, controller, lines, steps)
+    steps |= {f"{name}_{one}": method.brought(f"controller:{one}") for one in (*method.actions, *method.interrupts)}
+    return ControlUnit(name, params, controller, lines, steps, motor)

@@ -4,18 +4,21 @@ A file is little endian: "DTNV", version (1 byte), layout hash (4); then records
 
 | record | follows | meaning |
 |---|---|---|
-| 1 write | register (2), element (2), value (8: its bits) | what host or plant have written |
+| 1 write | register (2), element (2), value (8: its bits) | what the plant has written on a wire |
 | 2 ticks | n (2), n bytes | n ticks; of each the low byte of the hash after it |
 | 3 check | hash (8), image of all registers | every 1000th tick, and after the last one |
 | 4 signal | number (1), length (4), values in their width | what the host has laid ready |
+| 5 call | number (1), arguments in their widths | what the host did: `ControlUnit.calls` by number |
 | 0 end | ticks (8), hash of all bytes up to here (8) | |
 
-The state begins with all bits zero. An image is every register in the order of declaration, controller before lines,
-without padding; arrays of more than 64 elements are part of it, but enter the hash of a check only.
+The state begins with all bits zero, and nothing but these calls and the wires of the plant touches it. An image is
+every register in the order of declaration, controller before lines, without padding; arrays of more than 64 elements
+are part of it, but enter the hash of a check only.
 """
 
 import ctypes
 import struct
+from collections.abc import Callable
 from contextlib import suppress
 from itertools import pairwise
 from typing import Any
@@ -23,13 +26,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.errors import DetentError
 from detent.export.unit import LARGE, ControlUnit
 from detent.kernel.image import add_bytes, add_rows, begin_hash
 from detent.kernel.loop import Bytes
 from detent.kernel.registers import PLANT, Leaf, Registers
 
-MAGIC, VERSION = b"DTNV", 1
-END, WRITE, TICKS, CHECK, SIGNAL = range(5)
+MAGIC, VERSION = b"DTNV", 2
+END, WRITE, TICKS, CHECK, SIGNAL, CALL = range(6)
+FORMATS = {
+    "u1": "B", "u2": "H", "u4": "I", "i1": "b", "i2": "h", "i4": "i", "i8": "q", "f8": "d",
+}  # fmt: skip
+"""Formats of `struct` for the widths of arguments."""
 STRETCH = 1000  # ticks from check to check
 
 
@@ -41,7 +49,7 @@ class Golden:
     """A witness of a run: makes the vectors of its control unit."""
 
     def __init__(self, unit: ControlUnit, state: type[Registers], most: int) -> None:
-        self.unit, self.most, self.ticks = unit, most, 0
+        self.unit, self.motor, self.most, self.ticks = unit, unit.motor, most, 0
         self.params: Any = None
         self.hash = begin_hash()
         self.signals: list[tuple[int, int]] = []  # of each signal: its largest length, and bytes of an element
@@ -54,12 +62,15 @@ class Golden:
         self.picks: NDArray[np.int64] = (
             np.concatenate([self._bytes_of(k) for k in small]) if small else np.zeros(0, int)
         )
+        self._wires = [k for k, leaf in enumerate(self._leaves) if leaf.by == PLANT]
+        self._inside = [k for k, leaf in enumerate(self._leaves) if leaf.by != PLANT]
         self._inputs = [k for k in small if self._leaves[k].by == PLANT]
         where = np.cumsum([0, *(_size(self._leaves[k]) for k in small)])
         self._columns = {k: slice(int(where[n]), int(where[n + 1])) for n, k in enumerate(small)}
         self.rows: Bytes = np.zeros((STRETCH, len(self.picks)), np.uint8)
         self._known = bytes(sizes + ctypes.sizeof(unit.lines))
         self._feed: tuple[bytes, ...] = ()
+        self._actions = list(unit.entries.items())[1:]
         self._state: Any = None
 
     def _bytes_of(self, k: int) -> NDArray[np.int64]:
@@ -80,7 +91,6 @@ class Golden:
             self.params = params.controller.copy()
         elif bytes(self.params) != bytes(params.controller):
             raise EnoughError  # the parameters of a firmware stand still: what comes is another run
-        self._state = state
         laid = tuple(bytes(memoryview(one).cast("B")) for one in feed)
         for number, (new, one) in enumerate(zip(laid, feed, strict=True)):
             size = ctypes.sizeof(one._type_)
@@ -90,10 +100,40 @@ class Golden:
             if number >= len(self._feed) or new != self._feed[number]:
                 self.parts.append(struct.pack("<BBI", SIGNAL, number, len(one)) + new)
         self._feed = laid
+        self._look(state)
+
+    def act(self, params: Any, state: Any, action: Callable[..., Any], args: tuple[Any, ...]) -> Any:
+        """Let the host act, and note the call."""
+        del params  # an action that reads them is handed them
+        self._look(state)
+        number, name = next((k, name) for k, (name, one) in enumerate(self._actions) if one is action)
+        numbers = [one for one in args if not isinstance(one, Registers)]
+        widths = [FORMATS[code] for code in self.unit.calls[name] if code in FORMATS]
+        try:
+            self.parts.append(struct.pack("<BB" + "".join(widths), CALL, number, *numbers))
+        except struct.error as error:
+            raise DetentError(
+                f"{name}: got {', '.join(map(str, numbers))}; expected: numbers in the widths that its step "
+                f"declares ({error}); correct the host"
+            ) from error
+        given = action(*args)
+        self._known = self._memory()
+        return given
+
+    def _look(self, state: Any) -> None:
+        """Note what stands on the wires of the plant; refuse what a host has written without an action."""
+        self._state = state
         now = self._memory()
-        for k, offset in enumerate(self._offsets):
-            size = _size(self._leaves[k])
-            self._write(k, self._known[offset : offset + size], now[offset : offset + size])
+        for k in self._inside:
+            at = slice(self._offsets[k], self._offsets[k] + _size(self._leaves[k]))
+            if self._known[at] != now[at]:
+                raise DetentError(
+                    f"{self.unit.name}: got {self._leaves[k].path}, written by a host from outside; expected: a step "
+                    "of the controller that writes it; name that in `actions` of the method, and call it by `act`"
+                )
+        for k in self._wires:
+            at = slice(self._offsets[k], self._offsets[k] + _size(self._leaves[k]))
+            self._write(k, self._known[at], now[at])
         self._known = now
 
     def take(self, ticks: int) -> None:

@@ -25,8 +25,10 @@ TIMEOUT = 600.0  # of one replay [s]
 TOLD = 20  # registers that are told of a difference
 TRAPS = "-O1 -g -fsanitize=undefined,address -fno-sanitize-recover=all -DFIRMWARE_CHECK"
 ARM = "-mthumb -ffreestanding -nostartfiles"
-SMALL = {"code": "0x00000000", "code_length": "4M", "data": "0x20000000", "data_length": "4M"}
-LARGE = {"code": "0x80000000", "code_length": "64M", "data": "0x84000000", "data_length": "32M"}
+SMALL = {"code": "0x00000000", "code_length": "4M", "data": "0x20000000", "data_length": "4M",
+         "vectors_length": "16M"}  # fmt: skip
+LARGE = {"code": "0x80000000", "code_length": "64M", "data": "0x84000000", "data_length": "32M",
+         "vectors": "0x86000000", "vectors_length": "32M"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -59,11 +61,12 @@ def _host(name: str, compiler: str, *more: str) -> Target:
     return Target(name, compiler, compiler, "-DON_HOST", ("-O0", "-O2", "-Os", *more))
 
 
-def _cortex(name: str, flags: str, board: str) -> Target:
+def _cortex(name: str, flags: str, board: str, vectors: str = "0x21000000") -> Target:
+    """A board, and where it has memory for vectors."""
     return Target(
         name, "arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi", f"{ARM} -mcpu={flags}",
-        emulator="qemu-system-arm", machine=f"-M {board}", emulator_package="qemu-system-arm", memory=SMALL,
-        libraries="-nostdlib -lm -lc -lgcc", share=10,
+        emulator="qemu-system-arm", machine=f"-M {board}", emulator_package="qemu-system-arm",
+        memory=SMALL | {"vectors": vectors}, libraries="-nostdlib -lm -lc -lgcc", share=10,
     )  # fmt: skip
 
 
@@ -74,7 +77,7 @@ TARGETS = {
         _host("host-clang", "clang"),
         _cortex("cortex-m0", "cortex-m0", "mps2-an385"),
         _cortex("cortex-m4", "cortex-m4", "mps2-an386"),
-        _cortex("cortex-m7", "cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard", "mps2-an500"),
+        _cortex("cortex-m7", "cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard", "mps2-an500", "0x60000000"),
         Target(
             "rv32", "riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf",
             "--specs=picolibc.specs -march=rv32imac -mabi=ilp32 -ffreestanding -nostartfiles",
@@ -287,13 +290,9 @@ def differences(folder: str | Path, axis: Axis, job: str | Path | None = None) -
         raise InputError.of_file(str(place), f"a folder without {MANIFEST}", "an export", "detent export firmware")
     with tempfile.TemporaryDirectory() as made:
         new = export_firmware(
-            axis,
-            Path(made) / "new",
-            job=job,
-            prefix=manifest["name"],
-            ticks=max(1, int(manifest["ticks"])),
-            **manifest["drawn"],
-        )
+            axis, Path(made) / "new", job=job, motor=manifest["motor"], prefix=manifest["name"],
+            ticks=max(1, int(manifest["ticks"])), **manifest["drawn"],
+        )  # fmt: skip
         before, after = (_steps(one) for one in (place, new.folder))
         for step in sorted(before.keys() | after.keys()):
             if before.get(step) != after.get(step):

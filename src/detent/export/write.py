@@ -16,7 +16,7 @@ from detent.export.drawn import FILES, ROUNDS, Chance, drawn_vectors
 from detent.export.serial import serial_texts
 from detent.export.translate.program import Program
 from detent.export.translate.values import RefusedError
-from detent.export.unit import options_of, outside_ranges, unit_of
+from detent.export.unit import ControlUnit, options_of, outside_ranges, unit_of
 from detent.export.vectors import Golden, record
 from detent.files.text import write_errors
 
@@ -33,11 +33,12 @@ class Exported:
     manifest: Mapping[str, Any]
 
 
-def export_firmware(  # noqa: PLR0913 - an axis, and what its vectors are made of
+def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may be chosen
     axis: Axis,
     folder: str | Path,
     *,
     job: str | Path | None = None,
+    motor: str = "",
     prefix: str = "",
     ticks: int = TICKS,
     files: int = FILES,
@@ -53,8 +54,10 @@ def export_firmware(  # noqa: PLR0913 - an axis, and what its vectors are made o
         A folder that is empty, that holds an earlier export and nothing else, or that is not there.
     job : path, optional
         Job whose run gives the golden vectors; default: a short one of the method.
+    motor : str, optional
+        Which one, of an axis with several.
     prefix : str, optional
-        Of all names in C; default: from the name of the axis.
+        Of all names in C; default: from the name of the motor or the axis.
     ticks : int
         Ticks of the golden run at most, 1 or more.
     files : int
@@ -81,7 +84,7 @@ def export_firmware(  # noqa: PLR0913 - an axis, and what its vectors are made o
         if count < 0:
             raise DetentError(f"{option}: got {count}; expected: 0 or more; try: leave it out")
     refuse_other_files(target)
-    unit = unit_of(axis, prefix)
+    unit = unit_of(axis, prefix, motor)
     loaded = axis.load_job(job) if job is not None else axis.method.trial_job(axis.spec)
     golden = record(unit, axis, loaded, ticks)
     if golden.params is None or golden.ticks == 0:
@@ -99,7 +102,7 @@ def export_firmware(  # noqa: PLR0913 - an axis, and what its vectors are made o
     made["vectors/drawn.vec"] = drawn_vectors(chance, files, rounds)
     manifest = _manifest(axis, loaded.name, golden, program)
     manifest["drawn"] = {"files": files, "rounds": rounds}
-    made["README.md"] = readme(manifest, unit.name, seconds(axis.simulated.tick)).encode()
+    made["README.md"] = readme(manifest, unit, seconds(axis.simulated.tick)).encode()
     manifest["files"] = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(made.items())}
     made[MANIFEST] = as_json(manifest).encode()
     _write(target, made)
@@ -109,7 +112,8 @@ def export_firmware(  # noqa: PLR0913 - an axis, and what its vectors are made o
 def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[str, Any]:
     """What an export was made from, and what is not proven of it."""
     return {
-        "detent": __version__, "name": golden.unit.name, "axis": axis.name, "method": axis.method.name, "job": job,
+        "detent": __version__, "name": golden.unit.name, "axis": axis.name, "motor": golden.unit.motor,
+        "method": axis.method.name, "job": job,
         "ticks": golden.ticks, "hash": f"{golden.hash.number:016x}", "flags": FLAGS,
         "values": {row.key: row.value for row in axis.check().rows},
         "options": {f"{one.__name__}.{key}": value for (one, key), value in options_of(golden.params).items()},
@@ -170,19 +174,22 @@ def _write(folder: Path, made: Mapping[str, bytes]) -> None:
         part.rename(folder)
 
 
-def readme(manifest: Mapping[str, Any], name: str, tick: str) -> str:
+def readme(manifest: Mapping[str, Any], unit: ControlUnit, tick: str) -> str:
     """One page: what to call when."""
-    return f"""# {manifest["axis"]} as firmware
+    name, whose = unit.name, f"Motor {unit.motor} of {manifest['axis']}" if unit.motor else manifest["axis"]
+    return f"""# {whose} as firmware
 
 Written by detent {manifest["detent"]} from an axis of the method {manifest["method"]}. C99, no heap, no globals.
 
 1. Compile `{name}.c` and `{name}_params.c` with `{manifest["flags"]}`. Never `-ffast-math`.
 2. At power-on: check `{name}_selftest() == 0` and `{name}_check_params(&{name}_defaults) == 0`, set a
    `{name}_controller` and a `{name}_lines` to zero bytes, write what the sensors show into the lines, and call
-   `{name}_power_on`.
+   `{unit.begins}`.
 3. Every {tick}: write the lines that the plant writes, call `{name}_control`, and put the others out. Calls with the
    same pointers must not interrupt one another; two axes have two sets of registers.
-4. `registers.csv` names every register and `params.csv` every parameter. A `{name}_params` in RAM may be exchanged
+4. Between two ticks the main program may call {", ".join(f"`{one}`" for one in unit.calls)}; their comments in
+   `{name}.h` say what for.
+5. `registers.csv` names every register and `params.csv` every parameter. A `{name}_params` in RAM may be exchanged
    between two ticks, by its pointer.
 
 The simulation handles what happened in a tick at its end: equal bits need the same calls in the same order.

@@ -27,6 +27,7 @@ CompileResult: Any = UntypedCompileResult
 serialize: Any = untyped_serialize
 
 F = TypeVar("F", bound=Callable[..., Any])
+Act = Callable[..., Any]  # lets a host do something to its controller: ``act(action, *args)`` is ``action(*args)``
 
 
 class _Kept(NullCache):
@@ -78,6 +79,11 @@ def step(function: F) -> F:
 def hot_step(function: F) -> F:
     """`step` for what runs in every tick: always inlined, so that a caller's registers stay in machine registers."""
     return _compiled(function, forceinline=True)
+
+
+def do(action: Callable[..., Any], *args: Any) -> Any:
+    """An action of a host that nobody notes."""
+    return action(*args)
 
 
 def bounded(turns: int, why: str) -> Callable[[F], F]:

@@ -269,6 +269,8 @@ class Method(Protocol[SpecT]):
     the same `Wiring`, by the name of each motor."""
     actions: ClassVar[tuple[str, ...]] = ()
     """Steps of its `controller` that firmware has beside a tick of it, the first puts it on; none where it has none."""
+    interrupts: ClassVar[tuple[str, ...]] = ()
+    """Steps of its `controller` that a tick of it calls, and that an interrupt of firmware may call in its place."""
     boards: ClassVar[str] = ""
     """Place of how that firmware is led over a serial line, a `Board`; none where it is not."""
     linear_loops: ClassVar[str] = ""
@@ -417,6 +419,10 @@ class Method(Protocol[SpecT]):
                 "a drive has; run it live without --drive"
             )
         return self.brought(place)
+
+    def motor(self, spec: SpecT, motor: str) -> str:
+        """The name of a motor of the file, which is needed where it has several; empty where it has one without."""
+        return self._of_motor({name: name for name in self.sensors(spec)}, spec, motor)
 
     def _of_motor(self, motors: Mapping[str, T], spec: SpecT, motor: str) -> T:
         """What belongs to a motor; its name is needed where the file has several."""

@@ -22,6 +22,7 @@ AnyRecorder = Recorder | Capture  # what records a run: every n-th tick of all o
 class Witness(Protocol):
     """Sees every tick of a run, and what its host writes between two stretches of them."""
 
+    motor: str  # which of several it sees; empty where there is one
     rows: Bytes  # a row per tick, by its number modulo their count
     picks: Offsets
 
@@ -35,6 +36,10 @@ class Witness(Protocol):
 
     def take(self, ticks: int) -> None:
         """So many ticks have passed."""
+        ...
+
+    def act(self, params: Any, state: Any, action: Callable[..., Any], args: tuple[Any, ...]) -> Any:
+        """The host does ``action(*args)``, and gets what that gives."""
         ...
 
 
@@ -66,6 +71,13 @@ class Machine(Generic[P, S]):
     def time(self) -> float:
         """Simulated time since power-on [s]."""
         return self._clock.tick * self.tick
+
+    def act(self, action: Callable[..., Any], *args: Any) -> Any:
+        """Let the host do something to the controller: ``action(*args)``, and what that gives."""
+        r = self.recorder
+        if r is None or isinstance(r, Recorder | Capture):
+            return action(*args)
+        return r.act(self.params, self.state, action, args)
 
     def pass_time(self, seconds: float) -> None:
         """Let at most `seconds` pass (a tick at least); returns earlier when the axis waits for its host."""

@@ -1,7 +1,7 @@
 """What every run notes, whichever axis made it, and how a run is judged by what its own controller saw."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, Literal, TypeVar
 
@@ -88,6 +88,7 @@ class Evidence:
     count: float  # way of the axis per count that it sees [unit]; 0 where it sees none
     window: float  # error that counts as arrived [unit]
     unit: str = "m"  # of the axis: "m" or "rad"
+    forget: Callable[[], object] | None = None  # lets the controller begin a stretch; default: by its guard itself
 
     looks: int = 0
     limited: int = 0
@@ -103,7 +104,10 @@ class Evidence:
         self.looks, self.limited = self.looks + seen.looks, self.limited + seen.limited
         if rest and seen.looks:
             self._judge_rest(whose, seen)
-        forget_conduct(self.guard)
+        if self.forget is None:
+            forget_conduct(self.guard)
+        else:
+            self.forget()
 
     def _judge_rest(self, whose: str, seen: Any) -> None:
         counts = seen.highest - seen.lowest

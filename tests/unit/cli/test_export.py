@@ -8,6 +8,7 @@ from tests.unit.test_cli import call
 import detent
 from detent.export import teeth
 from detent.export import verify as proving
+from detent.methods.stepper_envelope.method import StepperEnvelopeMethod
 
 pytestmark = pytest.mark.compiled
 CASCADE, ZOOM = str(detent.example("cascade.toml")), str(detent.example("zoom.toml"))
@@ -36,9 +37,13 @@ def test_an_export_says_what_it_wrote_and_what_comes_next():
     assert not Path("out/cascade_axis.c").exists()
 
 
-def test_refusals_have_status_1_and_a_wrong_folder_2():
-    refused = call("export", "firmware", ZOOM, "--output", "out")
+def test_refusals_have_status_1_and_a_wrong_folder_2(monkeypatch):
+    with monkeypatch.context() as without:
+        without.setattr(StepperEnvelopeMethod, "actions", ())
+        refused = call("export", "firmware", ZOOM, "--output", "out")
     assert (refused.status, "FW01" in refused.err, Path("out").exists()) == (1, True, False)
+    unnamed = call("export", "firmware", ZOOM, "--output", "out")
+    assert (unnamed.status, "one of group_a, group_b" in unnamed.err, Path("out").exists()) == (2, True, False)
     Path("out").mkdir()
     Path("out/mine").write_text("mine")
     answer = export()

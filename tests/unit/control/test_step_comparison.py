@@ -15,7 +15,7 @@ from detent.control.step_rule import ACCEL, CRUISE, DECEL, IDLE, REST, STEP, Ste
 def run(p: ComparisonParams, position: int = 0, heading: int = 1) -> tuple[StepRule, list[int], list[int]]:
     c, r = Comparison(), StepRule()
     place_motor(r, position)
-    start_move(r, heading)
+    start_move(r, heading, 0)
     words, states = [], []
     while next_compared_step(p, c, r) == STEP:
         words.append(r.word)

@@ -70,20 +70,20 @@ def test_at_rest_nothing_happens():
 
 def test_an_automatic_move_follows_the_table_and_rests_at_the_sentinel():
     p, r = params(), motor()
-    start_move(r, 1)
+    start_move(r, 1, 0)
     states = []
     while decide(p, r) == STEP:
         states.append(r.state)
     assert states == [ACCEL] * 5 + [DECEL] * 4
     assert (r.state, r.position, r.index, r.word, r.active, r.event) == (REST, 9, -1, 0, 0, 1)
-    start_move(r, -1)
+    start_move(r, -1, 0)
     assert words(p, r) == [100, 200, 300, 400, 500, 400, 300, 200, 100]
     assert r.position == 0
 
 
 def test_equal_entries_are_a_cruise():
     p, r = params(), motor()
-    start_move(r, 1)
+    start_move(r, 1, 0)
     flat = np.array([0, 0, 0, -1], np.int16)
     states = [(decide(p, r, flat, flat), r.state) for _ in range(3)]
     assert states == [(STEP, ACCEL), (STEP, CRUISE), (STEP, CRUISE)]
@@ -107,13 +107,13 @@ def test_a_zone_limit_cuts_the_word_at_its_index():
     up = np.array([0, 1, LIMITED | 2, LIMITED | 2, 1, 0, -1], np.int16)
     for reload, expected in ((False, [100, 200, 250, 250, 200, 100]), (True, [1000, 500, 400, 400, 500, 1000])):
         p, r = params(reload), motor()
-        start_move(r, 1)
+        start_move(r, 1, 0)
         assert words(p, r, up) == expected
 
 
 def test_reloads_that_are_equal_do_not_disturb_the_comparison():
     p, r = params(reload=True), motor()
-    start_move(r, 1)
+    start_move(r, 1, 0)
     assert words(p, r) == [1000, 500, 333, 333, 200, 333, 333, 500, 1000]
     assert r.position == 9
 
@@ -121,7 +121,7 @@ def test_reloads_that_are_equal_do_not_disturb_the_comparison():
 @pytest.mark.parametrize("reload", [False, True])
 def test_the_literal_rule_takes_the_entry_whatever_the_speed(reload):
     p, r = params(reload, literal=True), motor()
-    start_move(r, 1)
+    start_move(r, 1, 0)
     up = np.array([4, 4, 0, 4, -1], np.int16)
     slow, fast = (1000, 200) if reload else (100, 500)
     relations = []
@@ -142,11 +142,11 @@ def test_words_compare_by_speed():
 
 def test_a_table_that_falls_too_fast_is_a_fault_and_the_motor_comes_down():
     p, r = params(), motor()
-    start_move(r, 1)
+    start_move(r, 1, 0)
     up = np.array([4, 4, 4, 4, 1, 0, -1], np.int16)
     assert words(p, r, up) == [100, 200, 300, 400, 300, 200, 100]
     assert (r.state, r.cause, r.index, r.event, r.active) == (FAULT, INFEASIBLE, -1, 1, 0)
-    start_move(r, 1)
+    start_move(r, 1, 0)
     assert words(p, r, up) == []
     r.reset = 1
     assert decide(p, r, up, DOWN) == IDLE
@@ -155,13 +155,13 @@ def test_a_table_that_falls_too_fast_is_a_fault_and_the_motor_comes_down():
 
 def test_in_fault_the_table_is_not_read_even_beyond_the_travel():
     p, r = params(), motor()
-    start_move(r, 1)
+    start_move(r, 1, 0)
     up = np.array([4, 4, 4, 4, -1], np.int16)
     assert words(p, r, up) == [100, 200, 300, 400, 300, 200, 100]
     assert (r.position, r.state, r.cause) == (7, FAULT, INFEASIBLE)
     r.reset = 1
     assert decide(p, r, up, up) == IDLE
-    start_move(r, -1)
+    start_move(r, -1, 0)
     assert decide(p, r, up, up) == IDLE
     assert (r.state, r.cause, r.event) == (FAULT, OUT_OF_RANGE, 1)
 
@@ -169,14 +169,14 @@ def test_in_fault_the_table_is_not_read_even_beyond_the_travel():
 @pytest.mark.parametrize("position", [-1, 10])
 def test_a_start_outside_the_travel_is_a_fault(position):
     p, r = params(), motor(position)
-    start_move(r, 1)
+    start_move(r, 1, 0)
     assert decide(p, r) == IDLE
     assert (r.state, r.cause, r.position) == (FAULT, OUT_OF_RANGE, position)
 
 
 def test_a_motor_that_runs_beyond_its_tables_comes_down():
     p, r = params(), motor()
-    start_move(r, 1)
+    start_move(r, 1, 0)
     assert words(p, r, most=4) == [100, 200, 300, 400]
     assert words(p, r, UP[:3], DOWN[:3]) == [300, 200, 100]
     assert (r.state, r.cause, r.position) == (FAULT, INFEASIBLE, 7)
@@ -184,7 +184,7 @@ def test_a_motor_that_runs_beyond_its_tables_comes_down():
 
 def test_a_start_at_the_sentinel_is_a_move_that_has_ended():
     p, r = params(), motor(9)
-    start_move(r, 1)
+    start_move(r, 1, 0)
     assert decide(p, r) == IDLE
     assert (r.state, r.position, r.event, r.active) == (REST, 9, 1, 0)
 
@@ -242,7 +242,7 @@ def test_a_lower_request_is_reached_index_by_index():
 
 def test_the_operator_ends_an_automatic_move():
     p, r = params(), motor()
-    start_move(r, 1)
+    start_move(r, 1, 0)
     words(p, r, most=3)
     deflect(p, r, 0, 4, 1)
     assert words(p, r) == [200, 100]
@@ -253,7 +253,7 @@ def test_the_operator_ends_an_automatic_move():
 def test_the_operator_ends_the_reversals_of_an_automatic_move():
     """The motor that he drives to a sentinel stands there: nothing is left of the move that would turn it."""
     p, r = params(), motor()
-    start_move(r, 1, turns=1)
+    start_move(r, 1, 1)
     decide(p, r)
     deflect(p, r, 500, 4, 1)
     decide(p, r)

@@ -11,11 +11,12 @@ from detent.errors import DetentError, InputError
 from detent.export.code import seconds
 from detent.export.translate.values import RefusedError
 from detent.export.unit import options_of, outside_ranges, unit_of
-from detent.export.vectors import CHECK, END, SIGNAL, TICKS, WRITE, record
+from detent.export.vectors import CALL, CHECK, END, SIGNAL, TICKS, WRITE, Golden, record
 from detent.export.verify import TARGETS, Target, differences, told_of, verify
 from detent.export.write import MANIFEST, export_firmware, read_manifest
 from detent.kernel.image import FNV_BASIS, FNV_PRIME, WHOLE, begin_hash
-from detent.methods.cascade.controller import CascadeControllerParams
+from detent.methods.cascade.controller import CascadeControllerParams, coast, guard_axis, take_event
+from detent.methods.cascade.host import CascadeHost
 
 pytestmark = pytest.mark.compiled
 MOST = 2200
@@ -66,7 +67,7 @@ def test_every_register_has_its_number_and_its_writer(folder, axis):
     assert by["controller.on"] == ""
 
 
-def parsed(data: bytes, leaves, signals=(8, 8, 8, 8)):
+def parsed(data: bytes, leaves, signals=(8, 8, 8, 8), calls=()):
     """Records of a file of vectors: (kind, content)."""
     k, image = 9, sum(leaf.width.size * max(leaf.length, 1) for leaf in leaves)
     while k < len(data):
@@ -85,6 +86,9 @@ def parsed(data: bytes, leaves, signals=(8, 8, 8, 8)):
             number, length = struct.unpack_from("<BI", data, k + 1)
             yield kind, (number, length)
             k += 6 + length * signals[number]
+        elif kind == CALL:
+            yield kind, (data[k + 1],)
+            k += 2 + sum(int(code[1]) for code in calls[data[k + 1]] if code[1:].isdigit())
         else:
             assert kind == END
             yield kind, struct.unpack_from("<Q", data, k + 1)[0]
@@ -93,9 +97,9 @@ def parsed(data: bytes, leaves, signals=(8, 8, 8, 8)):
 
 def test_the_vectors_hold_every_tick_and_a_check_every_thousand(folder, axis):
     leaves = unit_of(axis).leaves
-    data = (folder / "vectors/job.vec").read_bytes()
-    assert data[:5] == b"DTNV\1"
-    found = list(parsed(data, leaves))
+    data, unit_calls = (folder / "vectors/job.vec").read_bytes(), axis.method.actions
+    assert data[:5] == b"DTNV\2"
+    found = list(parsed(data, leaves, calls=list(unit_of(axis).calls.values())))
     assert sum(len(one) for kind, one in found if kind == TICKS) == MOST == found[-1][1]
     checks = [one for kind, one in found if kind == CHECK]
     assert len(checks) == 3
@@ -103,19 +107,40 @@ def test_the_vectors_hold_every_tick_and_a_check_every_thousand(folder, axis):
     assert checks[-1][0] & 0xFF == [one for kind, one in found if kind == TICKS][-1][-1]
     inputs = {leaf.path for leaf in leaves if leaf.by == "plant"}
     later = [leaves[one[0]].path for kind, one in found[len(found) // 2 :] if kind == WRITE]
-    assert set(later) <= inputs | {"c.entry"}
+    assert set(later) <= inputs
+    calls = [unit_calls[one[0]] for kind, one in found if kind == CALL]
+    assert calls[:4] == ["power_on", "guard_axis", "arrive_within", "take_event"]
+    assert {"begin", "forget_peaks", "take_event"} <= set(calls)
     assert {number for kind, (number, _) in ((k, o) for k, o in found if k == SIGNAL)} == {0, 1, 2, 3}
 
 
 def test_the_hash_is_fnv_1a_over_the_image_of_the_state(axis):
     unit = unit_of(axis)
     golden = record(unit, axis, axis.method.trial_job(axis.spec), 1)
-    found = dict(parsed(golden.vectors(), unit.leaves))
+    found = dict(parsed(golden.vectors(), unit.leaves, calls=list(unit.calls.values())))
     wanted = FNV_BASIS
     for byte in found[CHECK][1]:
         wanted = (wanted ^ byte) * FNV_PRIME & WHOLE
     assert found[CHECK][0] == wanted == golden.hash.number
     assert begin_hash().number == FNV_BASIS
+
+
+def test_what_a_host_does_is_a_call_and_nothing_else(axis):
+    unit, host = unit_of(axis), CascadeHost(axis.spec)
+    golden = Golden(unit, axis.method.registers(), 10)
+    host.machine.recorder = golden
+    with pytest.raises(DetentError, match=r"c\.left|c\.on|c\.known|c\.guarded.*written by a host from outside"):
+        host.act(coast)  # it was switched on before anybody looked
+    fresh = CascadeHost(axis.spec, golden)
+    assert int(fresh.act(take_event)) == 0
+    fresh.controller.known = 0
+    with pytest.raises(DetentError, match=r"c\.known, written by a host"):
+        fresh.pass_samples(1)
+    fresh.controller.known = 1
+    with pytest.raises(DetentError, match=r"guard_axis: got 256; expected: numbers in the widths"):
+        fresh.act(guard_axis, 256)
+    assert unit.calls["cascade_axis_power_on"] == ("params", "controller", "lines", "f8")
+    assert unit.calls["cascade_axis_guard_axis"] == ("controller", "u1")
 
 
 def test_the_same_input_gives_the_same_bytes(folder, axis, tmp_path):
@@ -156,9 +181,22 @@ def test_an_earlier_export_is_replaced_and_other_files_are_not(axis, tmp_path):
         export_firmware(axis, place / "cascade_axis.h")
 
 
-def test_a_method_without_a_control_unit_is_refused():
-    with pytest.raises(RefusedError, match=r"FW01: .*zoom.*expected: one of .*cascade"):
-        unit_of(detent.load(detent.example("zoom.toml")))
+def test_a_method_without_a_control_unit_is_refused(axis, monkeypatch):
+    monkeypatch.setattr(type(axis.method), "actions", ())
+    with pytest.raises(RefusedError, match=r"FW01: .*cascade.*expected: one of .*phase_servo"):
+        unit_of(axis)
+
+
+def test_a_unit_is_of_one_motor():
+    zoom = detent.load(detent.example("zoom.toml"))
+    with pytest.raises(DetentError, match="got no motor; expected: one of group_a, group_b"):
+        unit_of(zoom)
+    unit = unit_of(zoom, motor="group_b")
+    assert (unit.name, unit.motor, unit.begins) == ("group_b", "group_b", "group_b_place")
+    assert list(unit.entries)[0::8] == ["group_b_control", "group_b_next_period"]
+    golden = record(unit, zoom, zoom.load_job(detent.example("zoom_sequence.toml")), 50)
+    assert (golden.motor, golden.ticks) == ("group_b", 50)
+    assert [length for length, _ in golden.signals] == [zoom.spec.stepper["group_b"].steps + 1] * 2
 
 
 @pytest.mark.parametrize("prefix", ["1st", "a b", "int", "ä"])

@@ -98,7 +98,8 @@ class Calls(Expressions):
                 raise outside_language(node, f"{value.lo} to {value.hi} for {name} of an entry", "widen its annotation")
             g.names[name] = made
             self.program.changed = True
-        return cast(value, type_of_local(g.names[name])).text
+        # An entry takes the width of its declaration, any other step a type to compute in.
+        return cast(value, wanted.ctype if g.entry and wanted is not None else type_of_local(g.names[name])).text
 
     # ---- functions that are known
 

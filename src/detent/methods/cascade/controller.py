@@ -5,11 +5,13 @@ itself: a fault takes the command away in that sample. A fault, or an axis in po
 answer.
 """
 
+from detent.control import guard
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference
 from detent.control.cascade_law import control as control_law
 from detent.control.guard import (
     Guard,
     GuardParams,
+    await_arrival,
     enable_guard,
     is_overdue,
     lasting,
@@ -123,6 +125,58 @@ def engage(c: CascadeController) -> None:
     c.law.integral = 0.0
     enable_guard(c.guard)
     c.on = 1
+
+
+@step
+def guard_axis(c: CascadeController, on: u1) -> None:
+    """Faults switch off, or do not."""
+    c.guarded = on
+
+
+@step
+def begin(c: CascadeController) -> None:
+    """The next sample takes the first entry of what has been laid ready."""
+    c.entry = 0
+
+
+@step
+def arrive_within(c: CascadeController, samples: i8) -> None:
+    """The axis must be in position within so many samples: that, or a fault, is an event."""
+    c.within = 0
+    await_arrival(c.guard, samples)
+
+
+@step
+def take_event(c: CascadeController) -> int:
+    """The host's look at the event, which is answered by it: 0 none."""
+    event = c.event
+    c.event = 0
+    return event
+
+
+@step
+def coast(c: CascadeController) -> None:
+    """Take the command away and let the axis coast."""
+    c.on = 0
+
+
+@step
+def forget_peaks(c: CascadeController) -> None:
+    """A motion begins that has peaks of its own."""
+    c.peaks.following = c.peaks.command = 0.0
+    c.peaks.limited = 0
+
+
+@step
+def forget_following(c: CascadeController) -> None:
+    """Its reference stands: what follows has a peak of its own."""
+    c.peaks.following = 0.0
+
+
+@step
+def forget_conduct(c: CascadeController) -> None:
+    """A stretch begins that is to be judged for itself."""
+    guard.forget_conduct(c.guard)
 
 
 # ---- a sample

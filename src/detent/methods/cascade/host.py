@@ -1,19 +1,18 @@
 """The host of a cascade axis: it gives the loops their reference, lets samples pass, and answers the events."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.control.guard import await_arrival
 from detent.kernel.loop import Bytes, Offsets, advance, until_row, write_row
 from detent.kernel.registers import Leaf, Registers
 from detent.kernel.step import step
 from detent.methods.cascade.build import build_cascade
-from detent.methods.cascade.controller import Feed
+from detent.methods.cascade.controller import Feed, arrive_within, begin, forget_conduct, guard_axis, take_event
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.system import Cascade, CascadeParams, along, driven, switch_on
 from detent.planning.profile import Numbers, Profile
@@ -69,15 +68,23 @@ class CascadeHost:
         self.state: Any = Cascade()
         self.controller: Any = self.state.controller
         start = spec.mechanics.start_position if position is None else position
-        switch_on(self.params, self.state, start)
-        self.controller.guarded = 1
         self.tick: float = self.params.plant.machine.period
         self.sample_ticks: int = self.params.controller.sample_ticks
         self.machine = Machine[Any, Any](
             self.params, self.state, self.tick, recorder, advance=self._advance, feed=lambda: self.feed
         )
         self.feed: Feed = along(np.array([start]), np.zeros(1), np.zeros(1))
+        switch_on(self.params, self.state, start, self.machine.act)
+        self.act(guard_axis, 1)
         self._seen: Bytes | None = None
+
+    def act(self, action: Callable[..., Any], *args: Any) -> Any:
+        """Do something to the controller."""
+        return self.machine.act(action, self.controller, *args)
+
+    def forget(self) -> None:
+        """A stretch begins that is to be judged for itself."""
+        self.act(forget_conduct)
 
     @property
     def period(self) -> float:
@@ -92,12 +99,12 @@ class CascadeHost:
     def follow(self, profile: Profile) -> None:
         """Follow a reference from the next sample on; behind its end it stands."""
         self.feed = along(profile.position, profile.velocity, profile.acceleration)
-        self.controller.entry = 0
+        self.act(begin)
 
     def drive(self, command: Numbers) -> None:
         """Open the loops: the amplifier gets these commands, one per sample, and nothing behind their end."""
         self.feed = driven(command)
-        self.controller.entry = 0
+        self.act(begin)
 
     def _advance(self, p: CascadeParams, r: Cascade, ticks: int, *recording: Any) -> int:
         if self._seen is None:
@@ -107,15 +114,14 @@ class CascadeHost:
     def pass_samples(self, samples: int) -> int:
         """Let samples pass, at most to the end of the one that makes an event; which one, 0 if none did."""
         self.machine.pass_ticks(samples * self.sample_ticks)
-        event, self.controller.event = self.controller.event, 0
+        event = int(self.act(take_event))
         if event:
             self.machine.pass_ticks(self.controller.left)
         return event
 
     def arrive(self, samples: int) -> int:
         """Let samples pass until the axis is in position: that, or a fault, is the event."""
-        self.controller.within = 0
-        await_arrival(self.controller.guard, samples)
+        self.act(arrive_within, samples)
         return self.pass_samples(samples)
 
     def watch(self, samples: int) -> Rows:

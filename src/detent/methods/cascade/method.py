@@ -29,7 +29,10 @@ class CascadeMethod(Method[CascadeSpec]):
     senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:Cascade", "system:CascadeParams"
-    actions = ("power_on", "engage")
+    actions = (
+        "power_on", "engage", "guard_axis", "begin", "arrive_within", "take_event", "coast", "forget_peaks",
+        "forget_following", "forget_conduct",
+    )  # fmt: skip
     signals = "run:CASCADE_SIGNALS"
     timing = (
         "controller.left", "controller.reference.position", "lines.motor.count", "controller.motor_sensor.velocity",

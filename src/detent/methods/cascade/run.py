@@ -9,7 +9,7 @@ from detent.axisfile.blocks import describe_fault
 from detent.control.guard import NO_ARRIVAL
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.cascade.build import motion_limits
-from detent.methods.cascade.controller import ARRIVED, FAULT
+from detent.methods.cascade.controller import ARRIVED, FAULT, coast, forget_following, forget_peaks
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.moves.job import Move, MoveJob
@@ -132,8 +132,9 @@ def run_cascade_moves(
     targets = check_cascade_job(spec, job)
     host = CascadeHost(spec, recorder)
     evidence = Evidence(
-        host.controller.guard, host.period, spec.encoder.resolution, spec.method.in_position, spec.unit("m")
-    )
+        host.controller.guard, host.period, spec.encoder.resolution, spec.method.in_position, spec.unit("m"),
+        forget=host.forget,
+    )  # fmt: skip
     result = CascadeRun(job, tolerance=spec.method.in_position, max_command=spec.largest_command)
     place = spec.mechanics.start_position
     try:
@@ -149,7 +150,8 @@ def run_cascade_moves(
             if progress is not None:
                 progress(done / len(targets), f"move {done} of {len(targets)}")
         if result.failure:
-            result.time_off, host.controller.on = host.time, 0
+            result.time_off = host.time
+            host.act(coast)
             host.pass_samples(math.ceil(COAST / host.period))
     finally:
         host.machine.close()
@@ -166,13 +168,13 @@ def _make_move(  # noqa: PLR0913 - a move, who makes it, and who judges
     limits = replace(motion_limits(host.spec), speed=move.speed or host.spec.limits.speed)
     profile = plan_move(place, target, limits, host.period)
     begin, start, arrived, ready = host.time, load.position, math.nan, math.nan
-    peaks.following = peaks.command = peaks.limited = 0
+    host.act(forget_peaks)
     set_gauge(gauge, host.state.tick, start, target, result.tolerance)
     host.follow(profile)
     event = host.pass_samples(profile.count - 1)
     following, after = peaks.following, math.nan
     if not event:
-        peaks.following = 0.0
+        host.act(forget_following)
         arrived, event = host.time, _arrive(host)
     if event == ARRIVED:
         ready = host.time

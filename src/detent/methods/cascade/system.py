@@ -19,7 +19,7 @@ from detent.drive import effort_source
 from detent.kernel.elementary import one_less_exp
 from detent.kernel.loop import HostArray, lay_ready, ticks
 from detent.kernel.registers import Registers, block, i8, register
-from detent.kernel.step import hot_step
+from detent.kernel.step import Act, do, hot_step
 from detent.methods.cascade.controller import (
     CascadeController,
     CascadeControllerParams,
@@ -128,13 +128,13 @@ def set_count(p: CascadeParams, motor: float, load: float) -> None:
     p.plant.load_count = p.controller.load_sensor.resolution = load
 
 
-def switch_on(p: CascadeParams, r: Cascade, position: float) -> None:
+def switch_on(p: CascadeParams, r: Cascade, position: float, act: Act = do) -> None:
     """Power-on at rest with motor and load at `position` [m], where the reference stands too."""
     lines = r.lines
     stand_masses(r.plant.machine, position)
     latch_both(p.plant, r.plant.machine, lines)
     stand_home(p.plant.home, r.plant.home, lines.home, position)
-    power_on(p.controller, r.controller, lines, position)
+    act(power_on, p.controller, r.controller, lines, position)
 
 
 def set_off(p: CascadeParams, r: Cascade, velocity: float) -> None:

@@ -4,6 +4,7 @@ It sees the encoder as a synchronous circuit does: ten clocks in a tick of 10 us
 Clocks in which nothing happens, or nothing whose moment matters, are skipped.
 """
 
+from detent.control import guard
 from detent.control.clocks import SampleClock, count_clock
 from detent.control.deviation_counter import (
     FAULT,
@@ -16,7 +17,7 @@ from detent.control.deviation_counter import (
     drive_word,
     watch_ranges,
 )
-from detent.control.guard import Guard, GuardParams, enable_guard, is_overdue, watch, watch_number
+from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch, watch_number
 from detent.control.pulse_generator import (
     PulseGenerator,
     PulseGeneratorParams,
@@ -145,6 +146,32 @@ def shift_counters(c: FilteredController, pulses: int) -> None:
     c.watched += pulses
     c.generator.goal += pulses
     c.generator.command += pulses
+
+
+@step
+def set_period(c: FilteredController, sample_us: int) -> None:
+    """Sample period from the next window on [us]."""
+    c.clock.demanded = sample_us
+
+
+@step
+def arrive_within(c: FilteredController, ticks: int) -> None:
+    """The axis must come into position within so many ticks; 0 lifts it."""
+    await_arrival(c.guard, ticks)
+
+
+@step
+def take_event(c: FilteredController) -> int:
+    """The host's look at the event, which is answered by it: 1 in position, or failed."""
+    event = c.event
+    c.event = 0
+    return event
+
+
+@step
+def forget_conduct(c: FilteredController) -> None:
+    """A stretch begins that is to be judged for itself."""
+    guard.forget_conduct(c.guard)
 
 
 # ---- a clock of the decoder

@@ -2,11 +2,10 @@
 
 from detent.axisfile.blocks import describe_fault
 from detent.control.deviation_counter import FAULT, GUARDED
-from detent.control.guard import await_arrival
 from detent.control.pulse_generator import PER_PULSE
 from detent.errors import SERVO_FAULT_TEXT
 from detent.methods.filtered_servo.build import GUARD_PERIOD, build_filtered_servo
-from detent.methods.filtered_servo.controller import go_to
+from detent.methods.filtered_servo.controller import arrive_within, forget_conduct, go_to, set_period, take_event
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServo, advance_by_clocks, switch_on
 from detent.methods.moves.run import Destination, Host, Wrong
@@ -17,18 +16,20 @@ from detent.units import format_quantity
 class FilteredHost(Host):
     """Host of a filtered servo: command pulses, in position, fault."""
 
+    forgets = staticmethod(forget_conduct)
+
     def __init__(self, spec: FilteredServoSpec, recorder: AnyRecorder | None = None) -> None:
         p, r, home = build_filtered_servo(spec), FilteredServo(), spec.mechanics.start_position
-        switch_on(p, r, home, round(spec.method.sample_period * 1e6), spec.encoder.seed)
         machine = Machine(p, r, TICK, recorder, by_clocks=advance_by_clocks)
+        switch_on(p, r, home, round(spec.method.sample_period * 1e6), spec.encoder.seed, machine.act)
         within = (spec.method.in_position + 1) * spec.pulse
         super().__init__(spec, machine, grid=spec.pulse, tolerance=within, home=home, look=GUARD_PERIOD)
 
     def command(self, to: Destination) -> None:
         """Ask for the pulses; a sample period of the move takes effect with the next window."""
         move = to.move
-        self.controller.clock.demanded = round((move.sample_period or self.spec.method.sample_period) * 1e6)
-        go_to(self.controller, to.counts, round((move.speed or self.spec.limits.speed) / self.spec.pulse * PER_PULSE))
+        self.act(set_period, round((move.sample_period or self.spec.method.sample_period) * 1e6))
+        self.act(go_to, to.counts, round((move.speed or self.spec.limits.speed) / self.spec.pulse * PER_PULSE))
 
     def time_limit(self, to: Destination) -> float:
         """Time after which a move that is not in position has failed [s]."""
@@ -38,11 +39,11 @@ class FilteredHost(Host):
 
     def wait(self, seconds: float) -> bool:
         """Wait until in position; False on a fault, or when it is not within `seconds`."""
-        guard = self.controller.guard
-        await_arrival(guard, max(1, round(seconds / self.machine.tick)))
-        arrived = super().wait(seconds)
-        await_arrival(guard, 0)
-        return arrived and not guard.code and not self.failure
+        self.act(arrive_within, max(1, round(seconds / self.machine.tick)))
+        self.machine.pass_time(seconds)
+        arrived = bool(self.act(take_event))
+        self.act(arrive_within, 0)
+        return arrived and not self.controller.guard.code and not self.failure
 
     def problems(self, to: Destination, asked: float) -> Wrong:
         """Speed and sample period of a move against the limits of the counters."""
@@ -79,4 +80,4 @@ class FilteredHost(Host):
         left = ticks
         while left > 0:
             left -= self.machine.pass_ticks(left)
-            self.controller.event = 0
+            self.act(take_event)

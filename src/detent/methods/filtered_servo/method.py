@@ -35,7 +35,9 @@ class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
     senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:FilteredServo", "system:FilteredServoParams"
-    actions = ("power_on", "go_to", "reset")
+    actions = (
+        "power_on", "go_to", "reset", "set_period", "arrive_within", "take_event", "forget_conduct",
+    )  # fmt: skip
     every = 10
     seed = "encoder.seed"
     signals, timing = SIGNALS, TIMING

@@ -12,7 +12,7 @@ move. The controller ends with the drive word; PWM, amplifier and the total movi
 
 from detent.kernel.loop import Bytes, Offsets, ticks, write_row
 from detent.kernel.registers import Registers, block, i8, register
-from detent.kernel.step import hot_step, step
+from detent.kernel.step import Act, do, hot_step, step
 from detent.methods.filtered_servo.controller import (
     CLOCKS,
     FilteredController,
@@ -83,7 +83,9 @@ def advance_by_clocks(p: FilteredServoParams, r: FilteredServo, most: int, trace
     return n
 
 
-def switch_on(p: FilteredServoParams, r: FilteredServo, position: float, sample_us: int, seed: int) -> None:
+def switch_on(
+    p: FilteredServoParams, r: FilteredServo, position: float, sample_us: int, seed: int, act: Act = do
+) -> None:
     """Power-on with the slide at `position` [m], the sample clock at `sample_us`; `seed` starts all noise."""
     plant = r.plant
     plant.train.position = plant.sampled = position
@@ -92,4 +94,4 @@ def switch_on(p: FilteredServoParams, r: FilteredServo, position: float, sample_
     plant.amplifier.left = 1
     hold_levels(plant.encoder, r.lines)
     stand_home(p.plant.home, plant.home, r.lines.home, position)
-    power_on(r.controller, r.lines, sample_us)
+    act(power_on, r.controller, r.lines, sample_us)

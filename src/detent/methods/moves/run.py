@@ -6,8 +6,9 @@ the axis stands at after power-on is known to it (a home sensor tells it in a ma
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from typing import Any, ClassVar
 
 from detent.errors import MOST_PROBLEMS, AxisError, FileProblem, InputError
@@ -37,6 +38,9 @@ class Destination:
 class Host(ABC):
     """What each servo brings; the frame makes the moves of a job with it. What it leaves out has the default here."""
 
+    forgets: ClassVar[Callable[..., Any] | None] = None
+    """Action of its controller: a stretch begins that is to be judged for itself."""
+
     own_pace: ClassVar[str] = "this axis has one of its own"  # why a move can bring neither speed nor sample period
 
     def __init__(  # noqa: PLR0913 - an axis, and what is measured of it
@@ -47,7 +51,14 @@ class Host(ABC):
         self.tolerance = tolerance  # error that counts as arrived [m]
         self.home = home  # where it stands at power-on [m]
         # What its guard saw, which looks every `look` [s]; 0: it has none.
-        self.evidence = Evidence(self.controller.guard if look else None, look, self.count, tolerance)
+        self.evidence = Evidence(
+            self.controller.guard if look else None, look, self.count, tolerance,
+            forget=self.forgets and partial(self.act, self.forgets),
+        )  # fmt: skip
+
+    def act(self, action: Callable[..., Any], *args: Any) -> Any:
+        """Do something to the controller."""
+        return self.machine.act(action, self.controller, *args)
 
     @property
     def count(self) -> float:

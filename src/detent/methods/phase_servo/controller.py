@@ -5,6 +5,7 @@ samples. The words of the logic are combinational; they are worked out in the ti
 has changed. The clocks' own divider keeps the time.
 """
 
+from detent.control import guard
 from detent.control.clocks import (
     ClockChain,
     ClockParams,
@@ -16,7 +17,7 @@ from detent.control.clocks import (
     reference_period,
     sample_strobe,
 )
-from detent.control.guard import Guard, GuardParams, enable_guard, is_overdue, watch
+from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch
 from detent.control.phase_law import Law, LawParams, drive_word, integrate
 from detent.control.phase_sequencer import (
     ACQUIRE,
@@ -226,6 +227,18 @@ def take_ready(c: PhaseController) -> int:
     risen = c.sequencer.event and c.guard.code == 0
     c.sequencer.event = 0
     return 1 if risen else 0
+
+
+@step
+def arrive_within(c: PhaseController, windows: int) -> None:
+    """The axis must be ready within so many windows of the speed detector; 0 lifts it."""
+    await_arrival(c.guard, windows)
+
+
+@step
+def forget_conduct(c: PhaseController) -> None:
+    """A stretch begins that is to be judged for itself."""
+    guard.forget_conduct(c.guard)
 
 
 @step

@@ -4,13 +4,13 @@ import math
 
 from detent.axisfile.blocks import describe_fault
 from detent.axisfile.tables import DisturbanceTable
-from detent.control.guard import NO_ARRIVAL, await_arrival
+from detent.control.guard import NO_ARRIVAL
 from detent.control.phase_sequencer import POSITION_MODE
 from detent.errors import AxisError
 from detent.methods.moves.job import Move
 from detent.methods.moves.run import Destination, Host, Wrong
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.controller import command, take_ready
+from detent.methods.phase_servo.controller import arrive_within, command, forget_conduct, take_ready
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo, be_ready, switch_on
 from detent.record.machine import AnyRecorder, Machine
@@ -32,12 +32,13 @@ UNDISTURBED = DisturbanceTable()
 class PhaseHost(Host):
     """Host of a phase servo: set strobe with direction and distance, ready, stop."""
 
+    forgets = staticmethod(forget_conduct)
     own_pace = "this axis takes its speed from the velocity table"
 
     def __init__(self, spec: PhaseServoSpec, recorder: AnyRecorder | None = None) -> None:
         p, r, start = build_phase_servo(spec), PhaseServo(), spec.mechanics.start_position
-        switch_on(p, r, start, spec.detector.seed)
         machine, home = Machine(p, r, spec.tick, recorder), round(start / spec.pitch) * spec.pitch
+        switch_on(p, r, start, spec.detector.seed, machine.act)
         tolerance = spec.arrived_steps * spec.step
         super().__init__(spec, machine, grid=spec.pitch, tolerance=tolerance, home=home, look=spec.sample_period)
         self._counts = 0
@@ -50,7 +51,7 @@ class PhaseHost(Host):
     def start(self) -> None:
         """Wait until the axis has locked, settled on the nearest positioning point and is ready."""
         self.machine.pass_time(ACQUISITION)
-        if not take_ready(self.controller):
+        if not self.act(take_ready):
             raise AxisError(
                 f"the axis did not become ready within {format_quantity(ACQUISITION, 's')} of power-on: the tracker is "
                 "never silent; look for noise on the detector (detector.jitter, disturbance.lines)"
@@ -64,7 +65,7 @@ class PhaseHost(Host):
     def command(self, to: Destination) -> None:
         """Set strobe."""
         distance = to.counts - self._counts
-        command(self.controller, abs(distance), int(distance < 0))
+        self.act(command, abs(distance), int(distance < 0))
         self._counts = to.counts
 
     def time_limit(self, to: Destination) -> float:
@@ -75,12 +76,12 @@ class PhaseHost(Host):
 
     def wait(self, seconds: float) -> bool:
         """Wait until ready; False when it is not within `seconds`."""
-        guard, period = self.controller.guard, self.spec.sample_period
+        period = self.spec.sample_period
         windows = math.ceil(seconds / period)
-        await_arrival(guard, windows)
+        self.act(arrive_within, windows)
         self.machine.pass_time((windows + 1) * period)
-        ready = bool(take_ready(self.controller))
-        await_arrival(guard, 0)
+        ready = bool(self.act(take_ready))
+        self.act(arrive_within, 0)
         return ready
 
     def problems(self, to: Destination, asked: float) -> Wrong:

@@ -40,7 +40,7 @@ class PhaseServoMethod(MoveMethod[PhaseServoSpec]):
     senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:PhaseServo", "system:PhaseServoParams"
-    actions = ("power_on", "command", "acquire", "take_ready")
+    actions = ("power_on", "command", "acquire", "take_ready", "arrive_within", "forget_conduct")
     every = 256
     seed = "detector.seed"
     signals, timing = SIGNALS, TIMING

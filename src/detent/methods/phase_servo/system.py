@@ -12,7 +12,7 @@ of the reference clocks: the plant answers to the carrier, the controller sample
 from detent.control.phase_sequencer import SETTLE_READY
 from detent.kernel.loop import ticks
 from detent.kernel.registers import Registers, block, i8, register
-from detent.kernel.step import hot_step
+from detent.kernel.step import Act, do, hot_step
 from detent.methods.phase_servo.controller import PhaseController, PhaseControllerParams, PhaseLines, control, power_on
 from detent.methods.phase_servo.plant import PhasePlant, PhasePlantParams, move, sense
 from detent.plant.drive_train import DriveTrain
@@ -49,9 +49,9 @@ def tick(p: PhaseServoParams, r: PhaseServo, train: DriveTrain) -> bool:
     return True
 
 
-def switch_on(p: PhaseServoParams, r: PhaseServo, position: float, seed: int) -> None:
+def switch_on(p: PhaseServoParams, r: PhaseServo, position: float, seed: int, act: Act = do) -> None:
     """Power-on with the carriage at `position` [m]; `seed` starts the noise of comparator and lines."""
-    power_on(r.controller)
+    act(power_on, r.controller)
     r.plant.train.position = position
     r.plant.detector.noise.state = seed
     start_interference(p.plant.interference, r.plant.interference, seed ^ 0x5DEECE66D)

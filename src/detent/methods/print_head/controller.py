@@ -5,14 +5,14 @@ One call of `control` is one period of the 25 kHz trigger; firmware calls the sa
 
 from collections.abc import Iterable
 
-from detent.control import head_sequence
-from detent.control.column_timer import COLUMNS, fired, schedule
+from detent.control import column_timer, head_sequence
+from detent.control.column_timer import COLUMNS, schedule
 from detent.control.head_computer import HeadComputer, HeadParams
-from detent.control.head_sequence import decide, next_wake, on_emitter, on_reverse_edge
+from detent.control.head_sequence import next_wake, on_emitter, on_reverse_edge
 from detent.control.latch import read_latch, write_latch
 from detent.kernel.loop import controls
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i2_array, i8, register, u1, u1_array, u2
-from detent.kernel.step import hot_step, step
+from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i2_array, i8, register, u1, u1_array, u2
+from detent.kernel.step import Act, do, hot_step, step
 from detent.sensing.quadrature import Quadrature, count_edge
 
 PERIOD_US = 40
@@ -47,12 +47,19 @@ class PrintHeadLines(Registers):
     place: i2_array = register("which each was: its place in the line buffer", length=FIRES, by=CONTROLLER)
 
 
+# ---- interrupts: `control` calls them in the order of time, and firmware that has a decoder of its own may, too
+
+
 @hot_step
-def take_emitter(p: HeadParams, c: PrintHeadController, cycle: int, when: int) -> None:
-    """A new cycle of the decoder is an emitter interrupt; it also times the columns until the next one."""
+def begin(c: PrintHeadController, now_us: i8) -> None:
+    """A period begins: the 25 kHz trigger."""
+    c.head.now_us = now_us
+
+
+@hot_step
+def emitter(p: HeadParams, c: PrintHeadController, when: i8, change: i1) -> None:
+    """A new cycle of the decoder, 1 right or -1 left, at a time [us]; it also times the columns until the next one."""
     h = c.head
-    change = 1 if cycle > c.cycle else -1
-    c.cycle = cycle
     on_emitter(p, h, when, change)
     h.wake_us = next_wake(p, h)
     if h.columns.active and change == h.direction:
@@ -61,66 +68,91 @@ def take_emitter(p: HeadParams, c: PrintHeadController, cycle: int, when: int) -
 
 
 @hot_step
-def fire_until(c: PrintHeadController, lines: PrintHeadLines, begin: int, last: int) -> None:
-    """Fire the columns due up to `last` [us] in the period that began at `begin`."""
-    columns = c.head.columns
-    while columns.fire_us <= last:
-        k = min(lines.fired, FIRES - 1)
-        lines.fired_us[k] = columns.fire_us - begin
-        lines.place[k] = columns.bank * COLUMNS + columns.column
-        lines.fired = k + 1
-        fired(columns, c.head.buffer, c.head.direction)
+def reverse(p: HeadParams, c: PrintHeadController) -> None:
+    """An edge against the motion, which may end a stop."""
+    on_reverse_edge(p, c.head)
+    c.head.wake_us = next_wake(p, c.head)
 
 
 @hot_step
-def take_edge(p: HeadParams, c: PrintHeadController, lines: PrintHeadLines, begin: int, k: int) -> None:
-    """Edge `k` of the period that began at `begin`: four are an emitter, and one against the motion may end a stop.
+def fired(c: PrintHeadController) -> None:
+    """The column that was due at `columns.fire_us` has been fired."""
+    column_timer.fired(c.head.columns, c.head.buffer, c.head.direction)
+
+
+@hot_step
+def decide(p: HeadParams, c: PrintHeadController, lines: PrintHeadLines) -> None:
+    """The computer's turn in a period, after its events, and what it puts out."""
+    head_sequence.decide(p, c.head)
+    lines.count = c.head.out.count
+    lines.right_left = c.head.out.right_left
+    lines.transition = c.head.out.transition
+
+
+# ---- a period
+
+
+@hot_step
+def fire_until(c: PrintHeadController, lines: PrintHeadLines, since: int, last: int) -> None:
+    """Fire the columns due up to `last` [us] in the period that began at `since`."""
+    columns = c.head.columns
+    if columns.fire_us <= last:  # once: the next one is due by the next emitter
+        k = min(lines.fired, FIRES - 1)
+        lines.fired_us[k] = columns.fire_us - since
+        lines.place[k] = columns.bank * COLUMNS + columns.column
+        lines.fired = k + 1
+        fired(c)
+
+
+@hot_step
+def take_edge(p: HeadParams, c: PrintHeadController, lines: PrintHeadLines, since: int, k: int) -> None:
+    """Edge `k` of the period that began at `since`: four are an emitter, and one against the motion may end a stop.
 
     Only these two change what is due, so the columns due before the edge need not be fired at the others.
     """
     change = count_edge(c.quadrature, lines.levels[k] & 1, lines.levels[k] >> 1)
     cycle = c.quadrature.count >> 2
     if cycle != c.cycle:
-        when = begin + lines.when_us[k]
-        fire_until(c, lines, begin, when)
-        take_emitter(p, c, cycle, when)
+        when = since + lines.when_us[k]
+        fire_until(c, lines, since, when)
+        step_of_cycle = 1 if cycle > c.cycle else -1
+        c.cycle = cycle
+        emitter(p, c, when, step_of_cycle)
     if change == -c.head.direction:
-        fire_until(c, lines, begin, begin + lines.when_us[k])
-        on_reverse_edge(p, c.head)
-        c.head.wake_us = next_wake(p, c.head)
+        fire_until(c, lines, since, since + lines.when_us[k])
+        reverse(p, c)
 
 
 @hot_step
 def take_events(p: HeadParams, c: PrintHeadController, lines: PrintHeadLines) -> None:
     """Edges and due columns of the last period, in order of time."""
-    begin = c.head.now_us - PERIOD_US
+    since = c.head.now_us - PERIOD_US
     lines.fired = 0
-    for k in range(lines.edges):
-        take_edge(p, c, lines, begin, k)
-    fire_until(c, lines, begin, begin + PERIOD_US - 1)
+    for k in range(min(lines.edges, EDGES)):
+        take_edge(p, c, lines, since, k)
+    fire_until(c, lines, since, since + PERIOD_US - 1)
 
 
 @controls(HeadParams)
 @hot_step
 def control(p: HeadParams, c: PrintHeadController, lines: PrintHeadLines) -> None:
     """One period: what happened in the last one, the computer's turn, and what it puts out."""
-    c.head.now_us += PERIOD_US
+    begin(c, c.head.now_us + PERIOD_US)
     take_events(p, c, lines)
-    decide(p, c.head)
-    lines.count = c.head.out.count
-    lines.right_left = c.head.out.right_left
-    lines.transition = c.head.out.transition
+    decide(p, c, lines)
 
 
-def power_on(p: HeadParams, c: PrintHeadController, quarter: int, a: int, b: int) -> None:
-    """Reset, with the channels at `a` and `b`, which is this quarter of an emitter."""
+@step
+def power_on(p: HeadParams, c: PrintHeadController, quarter: u1, a: u1, b: u1, periods: int) -> None:
+    """Reset, with the channels at `a` and `b`, which is this quarter of an emitter; so many periods have passed."""
     c.quadrature.count, c.quadrature.channel_a, c.quadrature.channel_b = quarter, a, b
     c.cycle = 0
+    c.head.now_us = (periods - 1) * PERIOD_US
     head_sequence.power_on(p, c.head)
 
 
 @step
-def write_command(c: PrintHeadController, byte: int) -> None:
+def write_command(c: PrintHeadController, byte: u1) -> None:
     """The supervisor's side of the command latch; it is free while its flag is 0."""
     write_latch(c.head.command_latch, byte)
 
@@ -131,9 +163,16 @@ def read_status(c: PrintHeadController) -> int:
     return read_latch(c.head.status.latch)
 
 
-def load_line(c: PrintHeadController, bank: int, inked: Iterable[range]) -> None:
+@step
+def ink_columns(c: PrintHeadController, bank: u1, first: u2, end: u2, inked: u1) -> None:
+    """Columns `first` to below `end` of a bank of the line buffer print, or with `inked` 0 do not."""
+    base = COLUMNS if bank else 0
+    for k in range(min(first, COLUMNS), min(end, COLUMNS)):
+        c.head.buffer.ink[base + k] = inked
+
+
+def load_line(c: PrintHeadController, bank: int, inked: Iterable[range], act: Act = do) -> None:
     """Fill a bank of the line buffer: these columns print. Banks alternate with every PRINT, the first is bank 1."""
-    ink, base = c.head.buffer.ink, bank * COLUMNS
-    ink[base : base + COLUMNS] = [0] * COLUMNS
+    act(ink_columns, c, bank, 0, COLUMNS, 0)
     for columns in inked:
-        ink[base + columns.start : base + columns.stop] = [1] * len(columns)
+        act(ink_columns, c, bank, columns.start, columns.stop, 1)

@@ -22,6 +22,8 @@ class PrintHeadMethod(Method[PrintHeadSpec]):
     fills, derives = "schema:fill_derived", "derive:derive"
     senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
+    actions = ("power_on", "write_command", "read_status", "ink_columns")
+    interrupts = ("begin", "emitter", "reverse", "fired", "decide")
     state, params = "system:PrintHead", "system:PrintHeadParams"
     every = 10
     seed = "encoder.seed"

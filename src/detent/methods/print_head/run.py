@@ -56,8 +56,9 @@ def print_head_machine(
 ) -> Machine[print_head.PrintHeadParams, print_head.PrintHead]:
     """Print head at power-on."""
     p, r = build_print_head(spec), print_head.PrintHead()
-    print_head.switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed)
-    return Machine(p, r, print_head.TICK, recorder)
+    machine = Machine(p, r, print_head.TICK, recorder)
+    print_head.switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed, machine.act)
+    return machine
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,7 +368,7 @@ class SimulatedPrinting(Printing):
         self.machine, self.progress = print_head_machine(spec, recorder), progress
         super().__init__(spec, job, self.machine.params, self.machine.state)
         pass_time, controller = self.machine.pass_time, self.state.controller
-        self.supervisor = Supervisor(controller, pass_time, self.on_answer, spec.method.ack_last)
+        self.supervisor = Supervisor(controller, pass_time, self.on_answer, spec.method.ack_last, act=self.machine.act)
         self.began = 0.0
 
     def prepare(self) -> None:
@@ -388,7 +389,7 @@ class SimulatedPrinting(Printing):
                 return
             bank = (index + 1) & 1
             self.landed[bank] = NOT_FIRED
-            load_line(self.state.controller, bank, inked(plan.line))
+            load_line(self.state.controller, bank, inked(plan.line), self.machine.act)
             for command in line_commands(plan, preselected, index):
                 self.supervisor.send(command)
             preselected = plan.speed

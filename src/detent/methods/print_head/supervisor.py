@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from detent.control.head_commands import ACKNOWLEDGE
 from detent.control.head_computer import STATE_NAMES
 from detent.errors import AxisError, describe_sb1
+from detent.kernel.step import Act, do
 from detent.methods.print_head.controller import PrintHeadController, read_status, write_command
 
 MOST_OUTSTANDING = 3  # unanswered commands: the running one, and a speed or a motion behind it
@@ -75,6 +76,7 @@ class Supervisor:
     on_answer: Callable[[Answer], None]  # called with every `Answer` the moment it is read
     ack_last: bool = False  # the axis acknowledges the last byte of a command too
     patience: float = 60.0  # longest time a byte may take [s]; an axis that is silent for longer has failed
+    act: Act = do  # how it reaches the latches
     outstanding: deque[Command] = field(default_factory=deque[Command])
 
     def send(self, command: Command) -> None:
@@ -83,7 +85,7 @@ class Supervisor:
             self.await_answer()
         for k, byte in enumerate(command.data):
             self._await_free_latch(command)
-            write_command(self.controller, byte)
+            self.act(write_command, self.controller, byte)
             last = k == len(command.data) - 1
             if not last or (self.ack_last and len(command.data) > 1):
                 self._await_acknowledge(command)
@@ -139,4 +141,4 @@ class Supervisor:
                 f"{command.text}: no answer within {self.patience:g} s; the axis computer hangs in state "
                 f"{STATE_NAMES[self.controller.head.state]!r}"
             )
-        return int(read_status(self.controller))
+        return int(self.act(read_status, self.controller))

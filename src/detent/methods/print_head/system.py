@@ -11,7 +11,7 @@ period, what the controller makes of it, what the machine does with that.
 from detent.control.head_computer import HeadParams
 from detent.kernel.loop import ticks
 from detent.kernel.registers import Registers, block, i8, register
-from detent.kernel.step import hot_step
+from detent.kernel.step import Act, do, hot_step
 from detent.methods.print_head.controller import PERIOD_US, PrintHeadController, PrintHeadLines, control, power_on
 from detent.methods.print_head.plant import PrintHeadPlant, PrintHeadPlantParams, move, observe, sense, stand
 from detent.plant.drive_train import DriveTrain
@@ -50,9 +50,9 @@ def tick(p: PrintHeadParams, r: PrintHead, train: DriveTrain) -> bool:
     return True
 
 
-def switch_on(p: PrintHeadParams, r: PrintHead, position: float, seed: int) -> None:
+def switch_on(p: PrintHeadParams, r: PrintHead, position: float, seed: int, act: Act = do) -> None:
     """Power-on with the carriage at `position` [m]; `seed` starts the encoder's noise."""
     stand(p.plant, r.plant, position, seed)
     encoder = r.plant.encoder
-    power_on(p.controller, r.controller, encoder.edge & 3, encoder.channel_a, encoder.channel_b)
-    r.controller.head.now_us = (r.tick - 1) * PERIOD_US
+    quarter, a, b = encoder.edge & 3, encoder.channel_a, encoder.channel_b
+    act(power_on, p.controller, r.controller, quarter, a, b, r.tick)

@@ -4,10 +4,11 @@ Its clocks are divisions of the base tick: the strobe of the real-time clock, th
 timer task. What holds the dial, the buttons and the position number is the host.
 """
 
-from detent.control.guard import Guard, GuardParams, enable_guard, is_overdue, watch
+from detent.control import guard
+from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch
 from detent.control.table_positioner import Positioner, PositionerParams, begin_task, end_task, interrupt
 from detent.kernel.loop import controls
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i4, i8, register, u1, u4
+from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u4
 from detent.kernel.step import hot_step, step
 from detent.sensing.resolver_counter import AbsoluteAngle, CompositionParams, compose
 
@@ -127,3 +128,45 @@ def power_on(p: TableControllerParams, c: TableController, lines: TableLines, ta
     c.clocks.interrupt, c.clocks.task = p.clocks.delay_ticks, task_at
     c.positioner.z = lines.strobe = lines.enable = 1
     enable_guard(c.guard)
+
+
+@step
+def dial(c: TableController, speed: int) -> None:
+    """Set the speed dial [count/2^f per interrupt]."""
+    c.positioner.dial = speed
+
+
+@step
+def press(c: TableController, direction: i1) -> None:
+    """Hold a button down: 1 for +, -1 for -."""
+    c.positioner.plus, c.positioner.minus = direction > 0, direction < 0
+
+
+@step
+def release(c: TableController) -> None:
+    """No button."""
+    c.positioner.plus = c.positioner.minus = 0
+
+
+@step
+def position(c: TableController, number: u1) -> None:
+    """Set the position number and start; the positioner takes it in its next task."""
+    c.positioner.number, c.positioner.start = number, 1
+
+
+@step
+def acknowledge(c: TableController) -> None:
+    """The host has seen that the table is at rest."""
+    c.positioner.event = 0
+
+
+@step
+def arrive_within(c: TableController, strobes: int) -> None:
+    """The table must come to rest within so many strobes; 0 lifts it."""
+    await_arrival(c.guard, strobes)
+
+
+@step
+def forget_conduct(c: TableController) -> None:
+    """A stretch begins that is to be judged for itself."""
+    guard.forget_conduct(c.guard)

@@ -5,16 +5,18 @@ table has come to rest, that a start was refused, and how far from its target it
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from typing import Any
 
 from detent.axisfile.blocks import describe_fault
-from detent.control.guard import NO_ARRIVAL, await_arrival
+from detent.control.guard import NO_ARRIVAL
 from detent.control.table_positioner import HOLD, POWER_ON
 from detent.errors import MOST_PROBLEMS, TABLE_REFUSAL_TEXT, FileProblem, InputError
 from detent.files.nearest import BARELY, at_least, at_most
+from detent.methods.rotary_table import controller
 from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_file import find_faults
@@ -33,12 +35,15 @@ class TableHost:
 
     def __init__(self, spec: RotaryTableSpec, recorder: AnyRecorder | None = None) -> None:
         self.spec, p, r = spec, build_rotary_table(spec), RotaryTable()
-        switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
         self.machine = Machine(p, r, TICK, recorder)  # the simulated axis, at power-on
+        switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed, self.machine.act)
         # ctypes gives every register its type at run time only.
         self._controller: Any = self.machine.state.controller
         self.positioner: Any = self._controller.positioner
         self._refused_before = 0
+
+    def _act(self, action: Callable[..., Any], *args: Any) -> None:
+        self.machine.act(action, self._controller, *args)
 
     @property
     def tick(self) -> int:
@@ -55,7 +60,8 @@ class TableHost:
         """What the guard has seen, to be judged by an observer; its window is that of the axis and a count."""
         look = self.machine.params.controller.look_interrupts * self.spec.method.strobe_period
         window = (self.spec.method.in_position + 1) * self.spec.count
-        return Evidence(self._controller.guard, look, self.spec.count, window, "rad")
+        forget = partial(self._act, controller.forget_conduct)
+        return Evidence(self._controller.guard, look, self.spec.count, window, "rad", forget)
 
     # ------------------------------------------------------------------------------------------------------ panel
 
@@ -76,12 +82,12 @@ class TableHost:
 
     def acknowledge(self) -> None:
         """The host has seen that the table is at rest."""
-        self.positioner.event = 0
+        self._act(controller.acknowledge)
 
     def arrive_within(self, seconds: float) -> None:
         """The table must come to rest within a time [s]; 0 lifts it."""
         strobes = seconds / self.spec.method.strobe_period
-        await_arrival(self._controller.guard, max(1, math.floor(strobes)) if seconds else 0)
+        self._act(controller.arrive_within, max(1, math.floor(strobes)) if seconds else 0)
 
     @property
     def is_moving(self) -> bool:
@@ -95,17 +101,17 @@ class TableHost:
 
     def press(self, direction: int, speed: float) -> None:
         """Set the dial to a table speed [rad/s] and hold a button down: 1 for +, -1 for -."""
-        self.positioner.dial = dial_of(self.spec, speed)
-        self.positioner.plus, self.positioner.minus = direction > 0, direction < 0
+        self._act(controller.dial, dial_of(self.spec, speed))
+        self._act(controller.press, direction)
 
     def release(self) -> None:
         """No button."""
-        self.positioner.plus = self.positioner.minus = 0
+        self._act(controller.release)
 
     def begin(self, number: int) -> None:
         """Set the position number and start; the positioner takes it in its next task."""
         self._refused_before = self.positioner.refused
-        self.positioner.number, self.positioner.start = number, 1
+        self._act(controller.position, number)
 
     @property
     def refusal(self) -> str:

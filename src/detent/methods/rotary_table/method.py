@@ -21,7 +21,9 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     senses, begins = "derive:position_sensors", "mechanics.start_angle"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:RotaryTable", "system:RotaryTableParams"
-    actions = ("power_on",)
+    actions = (
+        "power_on", "dial", "press", "release", "position", "acknowledge", "arrive_within", "forget_conduct",
+    )  # fmt: skip
     every = 20
     seed = "detector.seed"
     signals = "run:SEQUENCE_SIGNALS"

@@ -12,7 +12,7 @@ move. Between its clocks the logic rests, and a tick is the exact motion of the 
 
 from detent.kernel.loop import ticks
 from detent.kernel.registers import Registers, block, i8, register
-from detent.kernel.step import hot_step
+from detent.kernel.step import Act, do, hot_step
 from detent.methods.rotary_table.controller import TableController, TableControllerParams, TableLines, control, power_on
 from detent.methods.rotary_table.plant import TablePlant, TablePlantParams, Train, move, sense
 from detent.plant.rotary_motor import stand_at
@@ -53,8 +53,8 @@ def tick(p: RotaryTableParams, r: RotaryTable, train: Train) -> bool:
     return True
 
 
-def switch_on(p: RotaryTableParams, r: RotaryTable, turns: float, task_at: int, seed: int) -> None:
+def switch_on(p: RotaryTableParams, r: RotaryTable, turns: float, task_at: int, seed: int, act: Act = do) -> None:
     """Power-on at rest with the motor at an angle in turns; `seed` starts the noise of both comparators."""
     stand_at(r.plant.train.motor, turns)
     r.plant.fine.state, r.plant.coarse.state = seed, seed ^ 0x5DEECE66D
-    power_on(p.controller, r.controller, r.lines, task_at)
+    act(power_on, p.controller, r.controller, r.lines, task_at)

@@ -166,7 +166,7 @@ def _course(spec: StepperEnvelopeSpec, name: str, method: str, way: int) -> Cour
     if code:
         start_hz = motor.table.max_hz if method == TOO_FAST else float(motor.tables.ramp.hz[0])
         motor.compare(code, range(way), start_hz)
-    start_move(motor.controller.rule, 1)
+    start_move(motor.controller.rule, 1, 0)
     motor.advance_to(1 << 60, 0, until_event=True)
     motor.advance_to(motor.r.tick + round(SETTLING / motor.p.plant.rotor.dt), 0, until_event=False)
     return Course(motor.rested, motor.lost, float(motor.r.plant.rotor.peak_lag) / table.drive.microsteps)

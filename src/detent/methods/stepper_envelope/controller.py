@@ -6,10 +6,21 @@ the control unit does not look at.
 
 from collections.abc import Sequence
 
-from detent.control.step_rule import IDLE, PAUSE, STEP, StepRule, StepRuleParams, next_entry, next_step
+from detent.control import step_rule
+from detent.control.step_rule import (
+    IDLE,
+    PAUSE,
+    STEP,
+    StepRule,
+    StepRuleParams,
+    next_entry,
+    next_step,
+    place_motor,
+    start_move,
+)
 from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, word_within
 from detent.kernel.loop import HostArray, controls, i2_signal
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i8, register, u1, u4
+from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u2, u4
 from detent.kernel.step import bounded, hot_step, step
 from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
 from detent.planning.step_ramp import StepRamp
@@ -51,6 +62,55 @@ class StepperLines(Registers):
     home: HomeLevels = block("home switch", by=PLANT)
 
 
+# ---- host actions
+
+
+@step
+def place(c: StepperController, position: int) -> None:
+    """Power-on or homing: the motor stands at `position` [step]."""
+    place_motor(c.rule, position)
+    c.stop_at = NOWHERE
+
+
+@step
+def start(c: StepperController, heading: i1, turns: u2) -> None:
+    """Start signal: to the end of the table of `heading`, 1 or -1, with so many reversals on the way."""
+    start_move(c.rule, heading, turns)
+
+
+@step
+def deflect(p: StepperControllerParams, c: StepperController, word: i4, heading: i1) -> None:
+    """The operator takes over and asks for a word of the ramp list, frequency or period; 0 releases."""
+    step_rule.deflect(p.rule, c.rule, word, p.rule.last, heading)
+
+
+@step
+def release(c: StepperController) -> None:
+    """The operator lets go: the motor comes down its ramp and rests."""
+    step_rule.release(c.rule)
+
+
+@step
+def reset(c: StepperController) -> None:
+    """Leave a fault, once the motor is at rest."""
+    c.rule.reset = 1
+
+
+@step
+def acknowledge(c: StepperController) -> None:
+    """The host has seen the event: time may pass on."""
+    step_rule.acknowledge(c.rule)
+
+
+@step
+def call_at(c: StepperController, position: int) -> None:
+    """An event when the motor passes `position` [step]; `NOWHERE` takes it back."""
+    c.stop_at = position
+
+
+# ---- a period
+
+
 @hot_step
 def begin_period(p: StepperControllerParams, c: StepperController, outcome: int) -> int:
     """The running period is over: load the timer with what was decided; hands the decision on."""
@@ -85,7 +145,7 @@ def put_out(c: StepperController, lines: StepperLines, outcome: int) -> bool:
 
 
 @step
-def actuate(
+def next_period(
     p: StepperControllerParams, c: StepperController, lines: StepperLines, up: i2_signal, down: i2_signal
 ) -> bool:
     """The running period is over: begin the next one, and drive the lines; False at rest."""
@@ -104,7 +164,7 @@ def control(
     lines.pulse = 0
     running = True
     while running and c.timer.expires <= c.now:
-        running = actuate(p, c, lines, up, down)
+        running = next_period(p, c, lines, up, down)
     c.now += p.instant_ticks
 
 
@@ -115,6 +175,7 @@ def load_rule(
     words = ramp.words(clock_hz, reload=reload)
     p.rule.ramp[: len(words)] = words.tolist()
     p.rule.limit[: len(limits)] = [word_within(hz, clock_hz, reload=reload) for hz in limits]
+    p.rule.last = len(words) - 1
     p.rule.index_mask, p.rule.zone_shift = INDEX_MASK, INDEX_BITS
     p.rule.reload = p.timer.reload = int(reload)
     p.timer.clock_hz = clock_hz

@@ -8,26 +8,26 @@ controller would know: the step counts. Whether the rotors followed is for an ob
 
 import ctypes
 import math
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from detent.control.step_rule import FAULT, REST, acknowledge, deflect, release, start_move
+from detent.control.step_rule import FAULT, REST
 from detent.control.step_timer import word_within
 from detent.errors import STEP_FAULT_TEXT, AxisError, FileProblem, InputError
 from detent.kernel.loop import advance
 from detent.kernel.registers import Registers, block, i8, register
 from detent.methods.stepper_envelope.build import build_stepper, instant, make_tables
-from detent.methods.stepper_envelope.controller import NOWHERE
+from detent.methods.stepper_envelope.controller import NOWHERE, acknowledge, call_at, deflect, release, start
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
 from detent.methods.stepper_envelope.system import Stepper, switch_on, tables, take_over
 from detent.planning.step_envelope import StepEnvelope
 from detent.plant.stepper_rotor import lost_steps
-from detent.record.machine import LONGEST_STRETCH, AnyRecorder
+from detent.record.machine import LONGEST_STRETCH, AnyRecorder, Machine, Witness
 from detent.units import format_quantity as text
 
 
@@ -49,19 +49,27 @@ def _registers_of(names: tuple[str, ...]) -> type[Registers]:
 
 
 class StageMotor:
-    """One motor of a stage at power-on, with its tables."""
+    """One motor of a stage at power-on, with its tables; a witness sees it alone."""
 
-    def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
+    def __init__(self, spec: StepperEnvelopeSpec, name: str, witness: Witness | None = None) -> None:
         self.name, self.table = name, spec.stepper[name]
         self.tables = make_tables(self.table)
         self.p: Any = build_stepper(spec, name, self.tables)
         # ctypes gives every register its type at run time only.
         self.r: Any = Stepper()
-        switch_on(self.r, self.table.step_inside(self.table.mechanics.start_position), self.p.plant.rotor.step_angle)
         self.controller: Any = self.r.controller
         self.feed: tuple[Any, ...] = tables(self.tables.up.entries, self.tables.down.entries)
+        self._witness, self._tick = witness, instant(spec)
+        self._every = 0  # ticks between two rows of a record
+        self.machine = self._machine()
+        start_at = self.table.step_inside(self.table.mechanics.start_position)
+        switch_on(self.r, start_at, self.p.plant.rotor.step_angle, self.machine.act)
         self.rows, self.picks = np.zeros((1, 1), np.uint8), np.zeros(0, np.int64)  # no record of it
         self.rested = 0.0  # when its last step was over [s], at the last event
+
+    def act(self, action: Callable[..., Any], *args: Any) -> None:
+        """Do something to the control unit."""
+        self.machine.act(action, self.controller, *args)
 
     @property
     def position(self) -> int:
@@ -108,16 +116,23 @@ class StageMotor:
         self.p, self.r = take_over(
             self.p, self.r, self.tables.up.zones, way, method=method, start_hz=start_hz, acceleration=acceleration
         )
-        self.controller, self.feed = self.r.controller, ()
+        self.controller, self.feed, self.machine = self.r.controller, (), self._machine()
+
+    def _machine(self) -> Machine[Any, Any]:
+        return Machine(self.p, self.r, self._tick, self._witness, advance=self._advance, feed=lambda: self.feed)
+
+    def _advance(self, p: Any, r: Any, ticks: int, *recording: Any) -> int:
+        if self._witness is None:
+            recording = self.rows, self.picks, self._every
+        return advance(p, r, ticks, *recording, *self.feed)
 
     def advance_to(self, at: int, every: int, *, until_event: bool) -> bool:
         """Advance up to an instant, or until the control unit has an event for the host; True if it has one."""
-        r, rule = self.r, self.controller.rule
+        r, rule, self._every = self.r, self.controller.rule, every
         while r.tick < at and not (until_event and rule.event):
             if not until_event:
-                acknowledge(rule)
-            n = min(at - r.tick, LONGEST_STRETCH)
-            advance(self.p, r, n, self.rows, self.picks, every, *self.feed)
+                self.act(acknowledge)
+            self.machine.pass_ticks(at - r.tick)
             if rule.event:
                 self.rested = self.controller.timer.expires / self.p.controller.timer.clock_hz
         return bool(rule.event)
@@ -126,9 +141,14 @@ class StageMotor:
 class Stage:
     """All motors of an axis, and the time they share."""
 
-    def __init__(self, spec: StepperEnvelopeSpec, recorder: AnyRecorder | None = None) -> None:
+    def __init__(self, spec: StepperEnvelopeSpec, recorder: AnyRecorder | Witness | None = None) -> None:
+        witness = None if recorder is None or isinstance(recorder, AnyRecorder) else recorder
+        recorder = recorder if isinstance(recorder, AnyRecorder) else None
         self.spec, self.tick, self.recorder = spec, instant(spec), recorder
-        self.motors = {name: StageMotor(spec, name) for name in spec.stepper}
+        self.motors = {
+            name: StageMotor(spec, name, witness if witness and witness.motor == name else None)
+            for name in spec.stepper
+        }
         self.instant = 0
         self._every = 0 if recorder is None else recorder.every
         self._columns: dict[str, Any] = {}  # of the record, by the motor that they are of
@@ -217,7 +237,7 @@ class Leg:
 class StageHost:
     """Host of a stage at power-on."""
 
-    def __init__(self, spec: StepperEnvelopeSpec, recorder: AnyRecorder | None = None) -> None:
+    def __init__(self, spec: StepperEnvelopeSpec, recorder: AnyRecorder | Witness | None = None) -> None:
         self.spec, self.stage = spec, Stage(spec, recorder)
         self.goal = {name: motor.place for name, motor in self.stage.motors.items()}
 
@@ -250,7 +270,7 @@ class StageHost:
             if leg.turn is not None:
                 second.move_start(leg.via)
                 second.move_stop(leg.target)
-            start_move(motor.controller.rule, heading, int(leg.turn is not None))
+            motor.act(start, heading, int(leg.turn is not None))
 
     def wait(self, names: Collection[str]) -> None:
         """Wait until these motors have come to rest."""
@@ -282,12 +302,12 @@ class StageHost:
         """Move the stop extreme of a running motor when it passes a place; True if it lay too near."""
         motor = self.stage.motors[name]
         rule = motor.controller.rule
-        motor.controller.stop_at = motor.table.step_inside(at)
+        motor.act(call_at, motor.table.step_inside(at))
         late = self.stage.wait_for([name], 1.0 + motor.longest)
-        motor.controller.stop_at = NOWHERE
+        motor.act(call_at, NOWHERE)
         if late or motor.resting:  # a fault of the rule, which the host sees when it waits for the end
             return False
-        acknowledge(rule)
+        motor.act(acknowledge)
         ahead, behind = motor.along(rule.direction)
         edit = ahead.move_stop(motor.table.step_inside(to), rule.position, rule.index)
         behind.move_start(edit.stop)
@@ -301,11 +321,11 @@ class StageHost:
         for table in (motor.tables.up, motor.tables.down):
             table.move_start(0 if table.direction > 0 else table.steps)
             table.move_stop(table.steps - table.start)
-        rule, reload = motor.controller.rule, self.spec.controller.words == "reload"
+        reload = self.spec.controller.words == "reload"
         word = word_within(motor.table.hz(abs(jog.speed)), motor.p.controller.timer.clock_hz, reload=reload)
-        deflect(motor.p.controller.rule, rule, word, len(motor.tables.ramp) - 1, heading)
+        motor.machine.act(deflect, motor.p.controller, motor.controller, word, heading)
         self.stage.pass_time(jog.duration)
-        release(rule)
+        motor.act(release)
         if not motor.resting:
             self.wait([jog.motor])
         self.goal[jog.motor] = motor.place

@@ -37,6 +37,8 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     senses, begins = "derive:position_sensors", "stepper.*.mechanics.start_position"
     refuses, warns = "rules:RULES", "checks:find_cautions"
     state, params = "system:Stepper", "system:StepperParams"
+    actions = ("place", "start", "deflect", "release", "reset", "acknowledge", "call_at")
+    interrupts = ("next_period",)
     every = 100
     takes, runs = "stage_job:StageJob", "run:run_stage"
     lives = "live:live"

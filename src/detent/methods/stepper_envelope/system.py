@@ -13,18 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.control.step_comparison import Comparison, ComparisonParams, next_compared_step
-from detent.control.step_rule import place_motor
 from detent.kernel.loop import lay_ready, ticks
 from detent.kernel.registers import Registers, block, i8, register
-from detent.kernel.step import hot_step
+from detent.kernel.step import Act, do, hot_step
 from detent.methods.stepper_envelope.controller import (
-    NOWHERE,
     Entries,
     StepperController,
     StepperControllerParams,
     StepperLines,
     begin_period,
     control,
+    place,
     put_out,
 )
 from detent.methods.stepper_envelope.plant import StepperPlant, StepperPlantParams, move
@@ -65,10 +64,9 @@ def tables(up: NDArray[np.int16], down: NDArray[np.int16]) -> tuple[Entries, Ent
     return lay_ready(up), lay_ready(down)
 
 
-def switch_on(r: Stepper, position: int, step_angle: float) -> None:
+def switch_on(r: Stepper, position: int, step_angle: float, act: Act = do) -> None:
     """Power-on with the motor standing at `position` [step], the rotor in the middle of its field."""
-    place_motor(r.controller.rule, position)
-    r.controller.stop_at = NOWHERE
+    act(place, r.controller, position)
     r.plant.rotor.commanded = position
     r.plant.rotor.angle = position * step_angle
     hold_field(r.plant.rotor)

@@ -7,6 +7,7 @@ from detent.control.column_timer import COLUMNS, NEVER
 from detent.methods.print_head.controller import (
     PERIOD_US,
     control,
+    ink_columns,
     load_line,
     power_on,
     read_status,
@@ -20,7 +21,7 @@ RIGHTWARD = (1, 3, 2, 0)
 def rig():
     """At rest in quarter 0 of emitter 1000, with a line of three columns in its buffer."""
     found = Rig().pretend_identified()
-    power_on(found.p.controller, found.r.controller, 0, 1, 0)
+    power_on(found.p.controller, found.r.controller, 0, 1, 0, 0)
     found.head.homed, found.head.width, found.head.state, found.head.emitter = 1, 4350, 3, 1000
     return found
 
@@ -80,6 +81,14 @@ def test_a_loaded_line_replaces_the_one_before(rig):
     load_line(c, 0, [range(7, 9)])
     load_line(c, 1, [range(4, 6)])
     assert [k for k, ink in enumerate(c.head.buffer.ink) if ink] == [7, 8, COLUMNS + 4, COLUMNS + 5]
+
+
+def test_columns_beyond_the_bank_are_left_alone(rig):
+    ink = rig.r.controller.head.buffer.ink
+    load_line(rig.r.controller, 0, [])
+    load_line(rig.r.controller, 1, [])
+    ink_columns(rig.r.controller, 0, COLUMNS - 2, COLUMNS + 5, 1)
+    assert [k for k in range(2 * COLUMNS) if ink[k]] == [COLUMNS - 2, COLUMNS - 1]
 
 
 def test_a_command_byte_drives_the_lines_in_the_same_period(rig):

@@ -30,7 +30,7 @@ def short_moves(stage: Stage) -> None:
     for name, steps in (("group_a", 60), ("group_b", 35)):
         motor = stage.motors[name]
         motor.tables.up.move_stop(steps)
-        start_move(motor.controller.rule, 1)
+        start_move(motor.controller.rule, 1, 0)
 
 
 def test_registers_carry_the_names_of_the_motors(spec):
@@ -66,7 +66,7 @@ def test_a_motor_runs_as_if_it_were_alone(spec):
     both, alone = Stage(spec), Stage(spec)
     short_moves(both)
     alone.motors["group_a"].tables.up.move_stop(60)
-    start_move(alone.motors["group_a"].controller.rule, 1)
+    start_move(alone.motors["group_a"].controller.rule, 1, 0)
     for stage in (both, alone):
         stage.wait_for(["group_a"], 5.0)
         stage.pass_time(0.01)
