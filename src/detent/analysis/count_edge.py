@@ -29,25 +29,11 @@ class EdgeCycle(NamedTuple):
 def edge_cycle(a: Numbers, b: Numbers, place: Numbers, command: Numbers, through: float) -> EdgeCycle | None:
     """Find the longest cycle of a loop across the edge of a count.
 
-    Parameters
-    ----------
-    a : ndarray
-        State from sample to sample, shape (n, n), of the loop cut open where the place is read.
-    b : ndarray
-        What the place that is read does to it, shape (n,).
-    place, command : ndarray
-        Where the encoder stands and what the loop commands, over the state, shape (n,).
-    through : float
-        What the place that is read does to the command in the same sample.
-
-    Returns
-    -------
-    EdgeCycle or None
-        For a count of 1; None where no cycle up to 256 samples long on each side exists.
-
-    References
-    ----------
-    Tsypkin 1984, Relay Control Systems, ch. 6. Checked by tests/unit/analysis/test_count_edge.py.
+    The state goes from sample to sample by `a`, shape (n, n), of the loop cut open where the place is read; what is
+    read there does `b`, shape (n,), to it, and `through` to the command in the same sample. `place` and `command`, of
+    shape (n,), say over the state where the encoder stands and what the loop commands. The cycle is that for a count of 1;
+    None where none up to 256 samples long on each side exists. Tsypkin 1984, Relay Control Systems, ch. 6; checked by
+    tests/unit/analysis/test_count_edge.py.
     """
     size, found = len(a), None
     power, driven = np.eye(size), np.zeros(size)  # A^k, and the sum of A^j B over j < k

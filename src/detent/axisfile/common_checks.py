@@ -53,7 +53,7 @@ def home(  # noqa: PLR0913 - an axis, and how it is written
     end, travel = ends[1] if table.side > 0 else ends[0], ends[1] - ends[0]
     inner, contact = isinstance(table, InnerHomeTable), table.by == "contact"
     farthest = end - table.side * table.edge_to_index if inner and table.by == "index" else end
-    beyond, room = (table.position - farthest) * table.side, 0.0 if inner else 0.5 * table.back_off
+    beyond, room = (table.position - farthest) * table.side, BARELY * travel if inner else 0.5 * table.back_off
     if not -(0.0 if contact else travel) <= beyond <= room:
         place = f"{text(farthest, unit)}, the end of the travel" if contact else "within the travel"
         if farthest != end:

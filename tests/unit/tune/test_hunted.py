@@ -183,12 +183,12 @@ def test_a_flicker_is_told_with_the_command_it_costs_and_closed_forms_beside_it(
     free = [*both(coulomb="0 N", static="0 N"), "drive.command_step=0 V", "method.velocity_integral=0 V/m"]
     made = axis(RIGID, [*free, "encoder.resolution=10 um"])
     standing = standstill.Standstill(CascadeEnsemble(made.spec), [stood("small"), stood("wide")])
-    found = hunted.Hunted(made.file, standing, None, None, None, [])
+    found = hunted.Hunted(made.file, standing, None, None, None, None, [])
     flicker, edge = found.told[1:]
     assert flicker == "flicker: count edge, by 1.5 um at 250 Hz (2 of 2 starts); its command goes to and fro by 4.5 V"
     assert edge == (
         "count edge by Tsypkin's method: 1.57 um at 333 Hz, the command by 4.53 V; simulated by 1.5 um at 250 Hz"
     )
     assert found.to_dict()["forecasts"][0]["kind"] == "count edge"
-    alone = hunted.Hunted(made.file, standstill.Standstill(standing.ensemble, []), None, None, None, [])
+    alone = hunted.Hunted(made.file, standstill.Standstill(standing.ensemble, []), None, None, None, None, [])
     assert alone.told[-1].endswith("the simulation does not")

@@ -97,7 +97,8 @@ def _way(spec: PhaseServoSpec) -> Iterator[Contradiction]:
     margin = spec.printing.left_margin
     places = {"mechanics.start_position": spec.mechanics.start_position, "print.left_margin": margin}
     yield from common.inside_travel(places, travel)
-    yield from common.home(remedy, spec.home, (0.0, travel), spec.limits.speed)
+    if travel >= pitch:
+        yield from common.home(remedy, spec.home, (0.0, travel), spec.limits.speed)
     reference = 0.0 if spec.home is None else spec.home.position
     point = round(reference / pitch) * pitch
     if abs(reference - point) > 0.5 * spec.step:

@@ -268,8 +268,11 @@ def fill_derived(spec: PhaseServoSpec) -> PhaseServoSpec:
     stall = current * spec.motor.torque_constant * 2 * math.pi / spec.mechanics.pulley_circumference
     if spec.home is not None:
         home = spec.home.completed((0.0, travel), spec.limits.speed, spec.pitch)
-        # Of a place that nobody states it takes the positioning point next to it.
-        own = spec.home.position if spec.home.position >= 0.0 else round(home.position / spec.pitch) * spec.pitch
+        # Of a place that nobody states it takes the positioning point next to it, before which the switch still fits.
+        near, most = round(home.position / spec.pitch), math.floor((travel - home.edge_to_index) / spec.pitch)
+        least = math.ceil(home.edge_to_index / spec.pitch)
+        own = (min(near, most) if home.side > 0 else max(near, least)) * spec.pitch
+        own = spec.home.position if spec.home.position >= 0.0 else own
         spec = spec.changed(home=home.model_copy(update={"position": own}))
     character = max(1, round(INCH / 10 / spec.pitch)) * spec.pitch
     return spec.filled(

@@ -22,9 +22,9 @@ MACHINE = [
     ),
     edit("short way", TRAVEL, 'travel = "0.4 mm"', "6:1", "limits.travel", overrides=("mechanics.start_position=0 m",)),
     edit("start", 'start_position = "0.1 in"', 'start_position = "15 in"', "24:1", "mechanics.start_position"),
-    added("left margin", '[print]\nleft_margin = "400 mm"', "54:1", "print.left_margin"),
-    added("character pitch", '[print]\ncharacter_pitch = "2.5 mm"', "54:1", "print.character_pitch"),
-    added("small characters", '[print]\ncharacter_pitch = "0.1 mm"', "54:1", "print.character_pitch"),
+    added("left margin", '[print]\nleft_margin = "400 mm"', "57:1", "print.left_margin"),
+    added("character pitch", '[print]\ncharacter_pitch = "2.5 mm"', "57:1", "print.character_pitch"),
+    added("small characters", '[print]\ncharacter_pitch = "0.1 mm"', "57:1", "print.character_pitch"),
     given(
         "another pulley",
         "mechanics.pulley_circumference=50 mm",
@@ -60,14 +60,14 @@ DETECTOR = [
 ]
 
 LINES = [
-    added("burst without a moment", f'[{BURST}]\nkind = "+"', "53:1", f"{BURST}.at"),
-    added("burst of both kinds", f'[{BURST}]\nkind = "+"\nat = "5 ms"\nticks = [20000]', "55:1", f"{BURST}.at"),
-    added("count beside ticks", f'[{BURST}]\nkind = "+"\ncount = 3\nticks = [20000]', "55:1", f"{BURST}.count"),
-    added("falling ticks", f'[{BURST}]\nkind = "-"\nticks = [20000, 10000, 10000]', "55:1", f"{BURST}.ticks"),
-    added("negative ticks", f'[{BURST}]\nkind = "-"\nticks = [-1, 5]', "55:1", f"{BURST}.ticks"),
-    added("many ticks", f'[{BURST}]\nkind = "-"\nticks = {list(range(65))}', "55:1", f"{BURST}.ticks"),
+    added("burst without a moment", f'[{BURST}]\nkind = "+"', "56:1", f"{BURST}.at"),
+    added("burst of both kinds", f'[{BURST}]\nkind = "+"\nat = "5 ms"\nticks = [20000]', "58:1", f"{BURST}.at"),
+    added("count beside ticks", f'[{BURST}]\nkind = "+"\ncount = 3\nticks = [20000]', "58:1", f"{BURST}.count"),
+    added("falling ticks", f'[{BURST}]\nkind = "-"\nticks = [20000, 10000, 10000]', "58:1", f"{BURST}.ticks"),
+    added("negative ticks", f'[{BURST}]\nkind = "-"\nticks = [-1, 5]', "58:1", f"{BURST}.ticks"),
+    added("many ticks", f'[{BURST}]\nkind = "-"\nticks = {list(range(65))}', "58:1", f"{BURST}.ticks"),
     added(
-        "close burst", f'[{BURST}]\nkind = "+"\nat = "5 ms"\ncount = 8\nspacing = "0.2 us"', "57:1", f"{BURST}.spacing"
+        "close burst", f'[{BURST}]\nkind = "+"\nat = "5 ms"\ncount = 8\nspacing = "0.2 us"', "60:1", f"{BURST}.spacing"
     ),
 ]
 
