@@ -118,7 +118,7 @@ def open_late(address: str) -> CanopenDrive:
     for _ in range(100):
         found = CanopenDrive(address, 5.0)
         with suppress(AxisError):
-            found.open(machine_wiring())
+            found.open(machine_wiring(found.mode))
             found.close()
             break
     return CanopenDrive(address, 5.0)

@@ -2076,12 +2076,13 @@ def test_46_positions_are_taught_typed_and_taken_back(tmp_path: Path) -> None:
 
 @pytest.mark.wide
 @pytest.mark.process
-def test_29_the_drive_may_be_another_process_on_a_serial_bus(monkeypatch):
+@pytest.mark.parametrize("mode", ["torque", "velocity"])
+def test_29_the_drive_may_be_another_process_on_a_serial_bus(monkeypatch, mode):
     # Two processes on a busy machine: how soon silence is a fault, test 30 sees.
     monkeypatch.setattr("detent.operate.drivers.canopen_drive.HEARTBEAT", 2.0)
-    with live_drive.wire() as (near, far), live_drive.served(f"slcan:{far}@5"):
-        live_drive.open_late(f"slcan:{near}@5")
-        with live_drive.driven(f"slcan:{near}@5") as bench:
+    with live_drive.wire() as (near, far), live_drive.served(f"slcan:{far}@5?mode={mode}"):
+        live_drive.open_late(f"slcan:{near}@5?mode={mode}")
+        with live_drive.driven(f"slcan:{near}@5?mode={mode}") as bench:
             ending, places = moved(ready_on(bench))
             assert ending.how == ops.DONE
             assert abs(places[-1] - 0.03) <= bench.spec.method.in_position
