@@ -3373,3 +3373,21 @@ def test_30_a_cut_cable_leaves_no_demand_behind_in_the_other_modes(mode):
         now = 0.035
         drive.watch()
         assert (STATE_NAMES[drive.state], drive.error, wires.enable) == ("fault", 0x8130, 0)
+
+
+@pytest.mark.wide
+def test_29_an_axis_that_is_stuck_behind_the_loops_of_its_drive_is_seen_by_its_torque():
+    """At a hard stop 5 mm ahead the integral of the drive pushes, and the guard here takes the torque away."""
+    channel = "test 29 stuck"
+    with (
+        live_drive.drive(channel, mode="velocity") as drive,
+        live_drive.driven(f"virtual:{channel}@5?mode=velocity") as bench,
+    ):
+        ready_on(bench)
+        stop = drive.plant.params.plant.stop
+        stop.side, stop.place, stop.stiffness, stop.damping = 1.0, 0.025, 1e8, 1e4
+        ended = bench.do(ops.MOVE_BY, 0.01)
+        assert (ended.how, ended.why) == (ops.FAILED, STUCK)
+        assert bench.answer.position == pytest.approx(0.025, abs=1e-4)
+        bench.host.run(2)
+        assert (drive.plant.state.lines.enable, drive.torque) == (0, 0)

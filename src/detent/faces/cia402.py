@@ -52,7 +52,8 @@ class Drive:
         self._mode = c.CYCLIC[wiring.mode]
         self._code = f"<H{self._mode.code}"
         self._told = bytes(struct.calcsize(self._code))
-        self._unit = rated * 1e-3 / wiring.torque if wiring.mode == "torque" else wiring.count
+        self._effort_unit = rated * 1e-3 / wiring.torque if wiring.torque else 1.0
+        self._unit = self._effort_unit if wiring.mode == "torque" else wiring.count
         self.node: Any = canopen.LocalNode(node, c.dictionary(node))
         for part, value in enumerate(identity, 1):
             self._keep(c.IDENTITY, part, value)
@@ -99,7 +100,7 @@ class Drive:
         """Objects that act when they are written."""
         if index == c.CONSUMER:
             self._limit, self._heard = (int.from_bytes(data, "little") & 0xFFFF) * 1e-3, self._clock()
-        elif index in (c.RX, c.TX, c.RX_MAP, c.TX_MAP):
+        elif index in (c.RX, c.TX, c.TX_2, c.RX_MAP, c.TX_MAP, c.TX_2_MAP):
             raise canopen.SdoAbortedError(0x06040041)  # what goes to and fro is as it is
         elif index == c.MODE and data[0] != self._mode.number:
             raise canopen.SdoAbortedError(0x06090030)  # it has no other
@@ -122,6 +123,8 @@ class Drive:
             put(lines, self.wiring.enable, int(self.state == ENABLED))
             put(lines, self.wiring.demand, self._place(demand) if self.wiring.zero else self._demand * self._unit)
             self.plant.sample()
+        if self.wiring.effort:
+            self.node.network.send_message(0x280 + self.node.id, struct.pack("<h", self.torque))
         answer = struct.pack("<HiH", c.WORDS[self.state] | VOLTAGE | REMOTE, self.position, self.error)
         self.node.network.send_message(0x180 + self.node.id, answer)
 
@@ -140,8 +143,11 @@ class Drive:
 
     @property
     def torque(self) -> int:
-        """What it was told to give now, in thousandths of its rated torque; 0 where it is told something else."""
-        return self._demand if self.wiring.mode == "torque" else 0
+        """What it gives now, in thousandths of its rated torque; 0 where that is not known."""
+        if self.wiring.mode == "torque":
+            return self._demand
+        effort = attrgetter(self.wiring.effort)(self.plant.state.lines) if self.wiring.effort else 0.0
+        return min(max(round(effort / self._effort_unit), -32768), 32767) if self.state == ENABLED else 0
 
     def _obey(self, word: int) -> None:
         """A controlword; a fault is left by the edge of its bit."""

@@ -28,7 +28,11 @@ from detent.errors import (
     AxisError,
     DetentError,
 )
+from detent.faces.cia402 import Drive
 from detent.methods.cascade.controller import CascadeLines
+from detent.methods.cascade.led import LedCascade, led_wiring
+from detent.methods.load import load_spec
+from detent.methods.method import Plant
 from detent.operate.drivers import cia402
 from detent.operate.drivers.canopen_drive import CanopenDrive, read_address
 from detent.operate.drivers.driver import Link, driver_of
@@ -255,6 +259,31 @@ def test_a_drive_is_told_a_velocity_in_its_own_unit_and_none_without_its_enable(
             wired.link.exchange()
         assert (drive.state != ENABLED, struct.unpack("<Hi", drive._told)[1], drive.torque) == (True, 0, 0)
         wired.link.close()
+
+
+def test_a_drive_that_closes_its_own_loops_tells_its_torque_as_the_command_that_makes_it():
+    with live_drive.still_drive("effort", "velocity", identity=live_drive.IDENTITY, rated=2.8) as drive:
+        wired = Wired(drive, "effort", mode="velocity")
+        drive.plant.state.lines.command = -5.0
+        wired.go(9, enable=1)
+        assert (drive.torque, wired.loop.lines.command) == (-500, pytest.approx(-5.0, abs=1e-9))
+        wired.go(2, enable=0)
+        assert (drive.torque, wired.loop.lines.command) == (0, 0.0)
+        wired.link.close()
+
+
+def test_a_drive_of_an_axis_whose_torque_per_command_is_not_known_is_not_asked_for_it():
+    spec = load_spec(live_drive.FILE, ['drive.input="voltage"'])
+    wiring = led_wiring(spec, "position")
+    state: Any = LedCascade()
+    drive = Drive(Plant(state, state, lambda: None), wiring, live_drive.NODE)
+    state.lines.command = 5.0
+    with live_drive.joined(drive, "no effort"):
+        driver = CanopenDrive("virtual:no effort@5?mode=position", 5.0)
+        assert "tells" not in {fact.name for fact in driver.open(wiring)}
+        drive.state = ENABLED
+        assert drive.torque == 0
+        driver.close()
 
 
 def test_a_drive_is_told_the_place_where_it_is_until_it_is_enabled_and_its_word_wraps():

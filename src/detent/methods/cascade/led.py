@@ -112,12 +112,14 @@ def led_wiring(spec: CascadeSpec, mode: str) -> Wiring:
     for met, got, allowed, remedy in refusals:
         if met:
             raise DetentError(f"{spec.axis.name}: got {got} and a drive; expected: {allowed}; try: {remedy}")
+    motor = spec.motor if spec.drive.input == "current" else None
+    torque = 0.0 if motor is None else motor.torque_constant * spec.drive.current_per_volt
     return Wiring(
         lines=LedLines, enable="enable", position="motor.count", demand="place" if mode == "position" else "velocity",
-        count=spec.encoder.resolution, turn=2.0 * math.pi * spec.radius / spec.encoder.resolution, torque=0.0,
+        count=spec.encoder.resolution, turn=2.0 * math.pi * spec.radius / spec.encoder.resolution, torque=torque,
         largest=spec.method.velocity_limit, sample=spec.method.sample_period,
         hardware=spec.hardware.id if spec.hardware else "", mode=mode, zero="zero" if mode == "position" else "",
-        samples="samples", firmware=bytes(build_cascade(spec).controller),
+        effort="command" if torque else "", samples="samples", firmware=bytes(build_cascade(spec).controller),
     )  # fmt: skip
 
 
@@ -159,6 +161,7 @@ def led_machine(spec: CascadeSpec, mode: str) -> tuple[Plant, Wiring]:
         ref.velocity = wires.velocity if mode == "velocity" else (wires.place - ref.position) / lines.sample
         ref.position = wires.place
         advance(host.params, host.state, host.sample_ticks, *NO_ROWS, *feed)
+        wires.command = host.state.lines.command
         wires.motor.count, wires.home = host.state.lines.motor.count, host.state.lines.home
 
     wires.motor.count = host.state.lines.motor.count

@@ -75,7 +75,7 @@ class CanopenDrive:
         self._network: Any = canopen.Network()
         self._network.NOTIFIER_CYCLE = LOOK
         self._answer, self._data = threading.Event(), b""
-        self._state = self._count = self._exchanges = self._error = self._heard = 0
+        self._state = self._count = self._exchanges = self._error = self._heard = self._effort = 0
         self._enabled, self._beat = False, 0.0
 
     # ---- beginning
@@ -118,6 +118,8 @@ class CanopenDrive:
                 f"canopen:{self.address}: got a drive without cyclic synchronous {self.mode} (6502: {modes:#x}); "
                 f"expected: that mode; {f'try: ?mode={others[0]}' if others else 'take another drive'}"
             )
+        rated = sdo[c.RATED_TORQUE].raw * 1e-3
+        self._effort_unit = 1e-3 * rated / w.torque if w.effort else 0.0
         takes = {"torque": self._fit_torque, "velocity": self._fit_velocity, "position": self._fit_position}[self.mode]
         found = takes(sdo)
         abort, reaction, window = (sdo[index].raw for index in (c.ABORT, c.FAULT_REACTION_OPTION, c.FOLLOWING))
@@ -125,6 +127,7 @@ class CanopenDrive:
         return [
             Fact("measures", f"the position of its motor (6064), {w.turn:g} counts in a turn, {w.count:g} m or rad"),
             *found,
+            *([Fact("tells", f"its torque (6077), of {rated:g} N*m rated, for the guard")] if w.effort else []),
             Fact("connection lost (6007)", f"{abort}: {ABORTS.get(abort, 'does what its maker says')}", idle),
             Fact("fault (605E)", f"{reaction}: {REACTIONS.get(reaction, 'does what its maker says')}"),
             Fact("following error (6065)", "off; the guard of the controller watches it" if window in (0, c.OFF)
@@ -187,9 +190,11 @@ class CanopenDrive:
     def _set_up(self, node: Any) -> None:
         """Its mode, and what goes to and fro; heartbeats both ways."""
         node.nmt.state = "PRE-OPERATIONAL"
+        effort = [(node.tpdo[2], (c.TORQUE_SHOWN,))] if self._wiring.effort else []
         for made, words in (
             (node.rpdo[1], (c.CONTROL, self._cyclic.target)),
             (node.tpdo[1], (c.STATUS, c.POSITION, c.ERROR_CODE)),
+            *effort,
         ):
             made.read()
             if made.enabled and made.trans_type == 1 and tuple(word.index for word in made) == words:
@@ -200,6 +205,8 @@ class CanopenDrive:
             made.trans_type, made.enabled = 1, True
             made.save()
         self._network.subscribe(node.tpdo[1].cob_id, self._take)
+        for made, _ in effort:
+            self._network.subscribe(made.cob_id, self._take_effort)
         self._choose_mode(node.sdo)
         node.sdo[c.PRODUCER].raw = math.ceil(self.silence / SILENT * 1e3)
         self._to = node.rpdo[1].cob_id
@@ -230,6 +237,10 @@ class CanopenDrive:
         self._data = bytes(data)
         self._answer.set()
 
+    def _take_effort(self, _id: int, data: bytearray, _moment: float) -> None:
+        """What it gives, in the thread of the bus; it counts when the next answer is read."""
+        (self._effort,) = struct.unpack("<h", data)
+
     def read(self, lines: Any) -> bool:
         """Position and state, as they were latched at the last SYNC."""
         if not self._answer.wait(self._wait):
@@ -239,6 +250,8 @@ class CanopenDrive:
         self._state = c.state_of(word)
         self._count += (count - self._count + SPAN // 2) % SPAN - SPAN // 2
         put(lines, self._wiring.position, self._count)
+        if self._wiring.effort:
+            put(lines, self._wiring.effort, self._effort * self._effort_unit)
         if self._wiring.samples:
             self._heard += 1
             put(lines, self._wiring.samples, self._heard)

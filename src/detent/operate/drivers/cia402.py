@@ -34,7 +34,7 @@ TORQUE, VELOCITY, PLACE = 0x6071, 0x60FF, 0x607A  # targets
 VELOCITY_UNIT, CYCLE = 0x60A9, 0x60C2
 ABORT, QUICK_STOP_OPTION, FAULT_REACTION_OPTION, FOLLOWING = 0x6007, 0x605A, 0x605E, 0x6065
 IDENTITY, CONSUMER, PRODUCER, RESOLUTION = 0x1018, 0x1016, 0x1017, 0x608F
-RX, RX_MAP, TX, TX_MAP = 0x1400, 0x1600, 0x1800, 0x1A00
+RX, RX_MAP, TX, TX_MAP, TX_2, TX_2_MAP = 0x1400, 0x1600, 0x1800, 0x1A00, 0x1801, 0x1A01
 MASTER = 127  # node number under which the master's heartbeat is sent
 SYNC = 0x80
 OFF = 0xFFFFFFFF  # following error window that watches nothing
@@ -107,6 +107,10 @@ RECORDS: dict[tuple[int, str], tuple[Entry, ...]] = {
     (TX, "TPDO communication parameter"): (
         Entry(1, "TPDO COB-ID", UNSIGNED32), Entry(2, "TPDO transmission type", UNSIGNED8, "rw", 1),
     ),
+    (TX_2, "TPDO communication parameter 2"): (
+        Entry(1, "TPDO 2 COB-ID", UNSIGNED32), Entry(2, "TPDO 2 transmission type", UNSIGNED8, "rw", 1),
+    ),
+    (TX_2_MAP, "TPDO mapping parameter 2"): (Entry(1, "TPDO 2 map 1", UNSIGNED32, "rw", TORQUE_SHOWN << 16 | 16),),
     (RX_MAP, "RPDO mapping parameter"): (
         Entry(1, "RPDO map 1", UNSIGNED32, "rw", CONTROL << 16 | 16),
         Entry(2, "RPDO map 2", UNSIGNED32, "rw", TORQUE << 16 | 16),
@@ -133,14 +137,14 @@ def dictionary(node: int) -> ObjectDictionary:
     for entry in OBJECTS:
         made.add_object(_variable(entry, entry.place))
     for (index, name), parts in RECORDS.items():
-        record: Any = (ODArray if index in (CONSUMER, RX_MAP, TX_MAP) else ODRecord)(name, index)
-        access = "rw" if index in (RX_MAP, TX_MAP) else "ro"
+        record: Any = (ODArray if index in (CONSUMER, RX_MAP, TX_MAP, TX_2_MAP) else ODRecord)(name, index)
+        access = "rw" if index in (RX_MAP, TX_MAP, TX_2_MAP) else "ro"
         record.add_member(_variable(Entry(0, "Number of entries", UNSIGNED8, access, len(parts)), index))
         for entry in parts:
             record.add_member(_variable(entry, index, entry.place))
         made.add_object(record)
     words: Any = made
-    words[RX][1].default, words[TX][1].default = 0x200 + node, 0x180 + node
+    words[RX][1].default, words[TX][1].default, words[TX_2][1].default = 0x200 + node, 0x180 + node, 0x280 + node
     return made
 
 
