@@ -13,6 +13,7 @@ import canopen
 
 from detent.errors import AxisError
 from detent.faces.cia402 import Drive, drive_of
+from detent.methods.cascade.led import LedCascade, led_wiring
 from detent.methods.cascade.wired import CascadeMachine, wiring
 from detent.methods.load import load_spec
 from detent.methods.method import Plant
@@ -84,10 +85,10 @@ def wire() -> Iterator[tuple[str, str]]:
                 os.close(end)
 
 
-def still_drive(channel: str, **more: Any) -> AbstractContextManager[Drive]:
+def still_drive(channel: str, mode: str = "torque", **more: Any) -> AbstractContextManager[Drive]:
     """The same before a machine that does not move: nothing is compiled for it."""
-    state = CascadeMachine()
-    return joined(Drive(Plant(state, state, lambda: None), machine_wiring(), NODE, **more), channel)
+    state = CascadeMachine() if mode == "torque" else LedCascade()
+    return joined(Drive(Plant(state, state, lambda: None), machine_wiring(mode), NODE, **more), channel)
 
 
 SERVED = """
@@ -117,12 +118,13 @@ def open_late(address: str) -> CanopenDrive:
     for _ in range(100):
         found = CanopenDrive(address, 5.0)
         with suppress(AxisError):
-            found.open(machine_wiring())
+            found.open(machine_wiring(found.mode))
             found.close()
             break
     return CanopenDrive(address, 5.0)
 
 
-def machine_wiring() -> Any:
+def machine_wiring(mode: str = "torque") -> Any:
     """The lines of the example."""
-    return wiring(load_spec(FILE, ()))
+    spec = load_spec(FILE, ())
+    return wiring(spec) if mode == "torque" else led_wiring(spec, mode)

@@ -2076,12 +2076,13 @@ def test_46_positions_are_taught_typed_and_taken_back(tmp_path: Path) -> None:
 
 @pytest.mark.wide
 @pytest.mark.process
-def test_29_the_drive_may_be_another_process_on_a_serial_bus(monkeypatch):
+@pytest.mark.parametrize("mode", ["torque", "velocity"])
+def test_29_the_drive_may_be_another_process_on_a_serial_bus(monkeypatch, mode):
     # Two processes on a busy machine: how soon silence is a fault, test 30 sees.
     monkeypatch.setattr("detent.operate.drivers.canopen_drive.HEARTBEAT", 2.0)
-    with live_drive.wire() as (near, far), live_drive.served(f"slcan:{far}@5"):
-        live_drive.open_late(f"slcan:{near}@5")
-        with live_drive.driven(f"slcan:{near}@5") as bench:
+    with live_drive.wire() as (near, far), live_drive.served(f"slcan:{far}@5?mode={mode}"):
+        live_drive.open_late(f"slcan:{near}@5?mode={mode}")
+        with live_drive.driven(f"slcan:{near}@5?mode={mode}") as bench:
             ending, places = moved(ready_on(bench))
             assert ending.how == ops.DONE
             assert abs(places[-1] - 0.03) <= bench.spec.method.in_position
@@ -3306,3 +3307,87 @@ def test_32_another_board_or_another_firmware_is_not_enabled():
         live_board.on_board(live_board.HARDWARE, "method.position_gain=30"),
     ):
         pass
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("mode", ["velocity", "position"])
+def test_29_a_drive_that_is_told_velocities_or_positions_ends_a_move_in_its_window(mode):
+    """Its loops are those of the example, without what they know of mass and friction; the guard here stays silent."""
+    channel = f"test 29 {mode}"
+    with (
+        live_drive.drive(channel, mode=mode) as drive,
+        live_drive.driven(f"virtual:{channel}@5?mode={mode}") as bench,
+    ):
+        facts = {fact.name: fact.value for fact in bench.host.link.facts}
+        assert facts["takes"].startswith(f"a {mode}")
+        assert facts["interpolates (60C2)"] == "over 0.25 ms"
+        driven, there = moved(ready_on(bench))
+        assert driven.how == ops.DONE
+        assert abs(drive.position * 1e-6 - 0.03) <= bench.spec.method.in_position
+        assert (bench.operation.fault, bench.host.board.wires.torn) == (0, 0)
+        jog = bench.host.ask(ops.JOG, 0.1)
+        bench.pass_time(0.15)
+        ahead = drive.position * 1e-6 - bench.answer.position
+        assert ahead == pytest.approx(0.1 * live_drive.SAMPLE, abs=2e-6)  # the answer was a sample ago
+        assert bench.answer.velocity == pytest.approx(0.1, rel=0.05)
+        bench.pass_time(LEASE + 0.3)  # nobody keeps it
+        assert bench.host.ending(jog) == Ending(jog, ops.FAILED, ops.LEASE_LOST, 0)
+        resting = drive.position
+        bench.pass_time(0.2)
+        assert abs(drive.position - resting) <= 3
+    simulated, here = moved(Bench("cascade", period=live_drive.SAMPLE).enable())
+    assert simulated.how == ops.DONE
+    apart = [abs(one - other) for one, other in zip(here, there, strict=False)]
+    # What nobody feeds forward the integral of the drive finds: 0.15 mm on the way, and 20 ms later in the window.
+    assert 0.0 < (len(there) - len(here)) * live_drive.SAMPLE < 0.03
+    assert 5e-5 < max(apart) < 3e-4
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("mode", ["velocity", "position"])
+def test_30_a_cut_cable_leaves_no_demand_behind_in_the_other_modes(mode):
+    now, channel = 0.0, f"test 30 {mode}"
+    with (
+        live_drive.drive(channel, mode=mode, clock=lambda: now) as drive,
+        live_drive.driven(f"virtual:{channel}@5?mode={mode}") as bench,
+    ):
+        ready_on(bench)
+        move = bench.host.ask(ops.MOVE_BY, 0.1)
+        bench.pass_time(0.2)
+        assert bench.answer.velocity > 0.2
+        wires, network = drive.plant.state.lines, drive.node.network
+        network.bus = None  # nothing of it is heard
+        network.notifier.stop()
+        bench.host.link.driver._wait, before = 1e-4, bench.loop.periods
+        while bench.operation.fault == 0:
+            bench.host.run(1)
+        assert bench.loop.periods - before <= 3 * live_drive.HEARTBEAT / live_drive.SAMPLE + 1
+        lines = bench.host.axis.state.lines
+        assert (bench.operation.fault, lines.enable, lines.velocity if mode == "velocity" else 0.0) == (
+            DRIVE_LOST,
+            0,
+            0,
+        )
+        assert bench.host.ending(move) == Ending(move, ops.FAILED, DRIVE_LOST, 0)
+        assert wires.enable == 1  # so far as the drive knows
+        now = 0.035
+        drive.watch()
+        assert (STATE_NAMES[drive.state], drive.error, wires.enable) == ("fault", 0x8130, 0)
+
+
+@pytest.mark.wide
+def test_29_an_axis_that_is_stuck_behind_the_loops_of_its_drive_is_seen_by_its_torque():
+    """At a hard stop 5 mm ahead the integral of the drive pushes, and the guard here takes the torque away."""
+    channel = "test 29 stuck"
+    with (
+        live_drive.drive(channel, mode="velocity") as drive,
+        live_drive.driven(f"virtual:{channel}@5?mode=velocity") as bench,
+    ):
+        ready_on(bench)
+        stop = drive.plant.params.plant.stop
+        stop.side, stop.place, stop.stiffness, stop.damping = 1.0, 0.025, 1e8, 1e4
+        ended = bench.do(ops.MOVE_BY, 0.01)
+        assert (ended.how, ended.why) == (ops.FAILED, STUCK)
+        assert bench.answer.position == pytest.approx(0.025, abs=1e-4)
+        bench.host.run(2)
+        assert (drive.plant.state.lines.enable, drive.torque) == (0, 0)

@@ -24,8 +24,8 @@ File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=Fal
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
 PERIOD = "Time between two periods of the loop; a machine without real-time priority may need a longer one."
 DRIVE = (
-    "What is at the other end of the lines: sim; canopen:INTERFACE:CHANNEL@NODE, as canopen:socketcan:can0@5; or a "
-    "board, serial:PORT, as serial:/dev/ttyACM0."
+    "What is at the other end of the lines: sim; canopen:INTERFACE:CHANNEL@NODE, as canopen:socketcan:can0@5, "
+    "behind which may follow ?mode=velocity or ?mode=position; or a board, serial:PORT, as serial:/dev/ttyACM0."
 )
 FOR = "End after so many seconds by itself."
 STORE = "Where to keep what survives; by default beside the axis file."

@@ -2,7 +2,8 @@
 
 A SYNC is a sample: what the master has sent before it acts, the encoder latches, the answer goes out, and the time of a
 sample passes in the mechanics. Without a SYNC their time stands. When nothing is heard of the master for longer than
-it has asked to be watched (1016), the drive does what its abort connection option code says (6007).
+it has asked to be watched (1016), the drive does what its abort connection option code says (6007). It has one mode, of
+torques, velocities or positions; in the latter two it closes the loops of the axis file by itself.
 """
 
 import struct
@@ -47,14 +48,20 @@ class Drive:
         self.plant, self.wiring, self.state, self.error = plant, wiring, NOT_READY, 0
         self._clock, self._lock = clock, threading.Lock()
         self._heard = self._limit = 0.0
-        self._word, self._torque, self._told = 0, 0, b"\0\0\0\0"
-        self._per_mille = rated * 1e-3 / wiring.torque
+        self._word = self._demand = 0
+        self._mode = c.CYCLIC[wiring.mode]
+        self._code = f"<H{self._mode.code}"
+        self._told = bytes(struct.calcsize(self._code))
+        self._effort_unit = rated * 1e-3 / wiring.torque if wiring.torque else 1.0
+        self._unit = self._effort_unit if wiring.mode == "torque" else wiring.count
         self.node: Any = canopen.LocalNode(node, c.dictionary(node))
         for part, value in enumerate(identity, 1):
             self._keep(c.IDENTITY, part, value)
         self._keep(c.RESOLUTION, 1, round(wiring.turn * 1000))
         self._keep(c.RESOLUTION, 2, 1000)
         self._keep(c.RATED_TORQUE, 0, round(rated * 1e3))
+        self._keep(c.MODES, 0, self._mode.bit)
+        self._keep(c.RX_MAP, 2, self._mode.target << 16 | 8 * struct.calcsize(self._mode.code))
         self.node.add_read_callback(self._read)
         self.node.add_write_callback(self._written)
 
@@ -85,16 +92,22 @@ class Drive:
         """Objects that show how the drive is."""
         shown = {
             c.STATUS: c.WORDS[self.state] | VOLTAGE | REMOTE, c.POSITION: self.position, c.ERROR_CODE: self.error,
-            c.MODE_SHOWN: c.CYCLIC_TORQUE, c.TORQUE_SHOWN: self._torque, 0x1001: 1 if self.error else 0,
+            c.MODE_SHOWN: self._mode.number, c.TORQUE_SHOWN: self.torque, 0x1001: 1 if self.error else 0,
         }  # fmt: skip
         return shown.get(index)
 
-    def _written(self, *, index: int, data: bytes, **_: Any) -> None:
+    def _written(self, *, index: int, subindex: int, data: bytes, **_: Any) -> None:
         """Objects that act when they are written."""
         if index == c.CONSUMER:
             self._limit, self._heard = (int.from_bytes(data, "little") & 0xFFFF) * 1e-3, self._clock()
-        elif index in (c.RX, c.TX, c.RX_MAP, c.TX_MAP):
+        elif index in (c.RX, c.TX, c.TX_2, c.RX_MAP, c.TX_MAP, c.TX_2_MAP):
             raise canopen.SdoAbortedError(0x06040041)  # what goes to and fro is as it is
+        elif index == c.MODE and data[0] != self._mode.number:
+            raise canopen.SdoAbortedError(0x06090030)  # it has no other
+        elif index == c.CYCLE and subindex == 2:
+            told = int.from_bytes(self.node.get_data(c.CYCLE, 1), "little"), int.from_bytes(data, "little", signed=True)
+            if told != c.cycle_of(self.wiring.sample):
+                raise canopen.SdoAbortedError(0x06090030)  # nor another sample
         elif index == c.CONTROL:
             self._obey(int.from_bytes(data, "little"))
 
@@ -103,17 +116,24 @@ class Drive:
         if self.node.nmt.state != "OPERATIONAL":
             return
         with self._lock:
-            word, torque = struct.unpack("<Hh", self._told)
+            word, demand = struct.unpack(self._code, self._told)
             self._obey(word)
-            self._torque = torque if self.state == ENABLED else 0
+            self._demand = demand if self.state == ENABLED else 0
             lines = self.plant.state.lines
             put(lines, self.wiring.enable, int(self.state == ENABLED))
-            put(lines, self.wiring.demand, self._torque * self._per_mille)
+            put(lines, self.wiring.demand, self._place(demand) if self.wiring.zero else self._demand * self._unit)
             self.plant.sample()
+        if self.wiring.effort:
+            self.node.network.send_message(0x280 + self.node.id, struct.pack("<h", self.torque))
         answer = struct.pack("<HiH", c.WORDS[self.state] | VOLTAGE | REMOTE, self.position, self.error)
         self.node.network.send_message(0x180 + self.node.id, answer)
 
     # ---- the drive
+
+    def _place(self, demand: int) -> float:
+        """Position that a word means: the nearest to where it is."""
+        here = int(attrgetter(self.wiring.position)(self.plant.state.lines))
+        return (here + (demand - here + (1 << 31)) % (1 << 32) - (1 << 31)) * self._unit
 
     @property
     def position(self) -> int:
@@ -123,8 +143,11 @@ class Drive:
 
     @property
     def torque(self) -> int:
-        """What it gives now, in thousandths of its rated torque."""
-        return self._torque
+        """What it gives now, in thousandths of its rated torque; 0 where that is not known."""
+        if self.wiring.mode == "torque":
+            return self._demand
+        effort = attrgetter(self.wiring.effort)(self.plant.state.lines) if self.wiring.effort else 0.0
+        return min(max(round(effort / self._effort_unit), -32768), 32767) if self.state == ENABLED else 0
 
     def _obey(self, word: int) -> None:
         """A controlword; a fault is left by the edge of its bit."""
@@ -139,7 +162,7 @@ class Drive:
     def fail(self, code: int) -> None:
         """A fault: no torque, until the edge that resets it."""
         with self._lock:
-            self.state, self.error, self._torque = FAULT, code, 0
+            self.state, self.error, self._demand = FAULT, code, 0
             put(self.plant.state.lines, self.wiring.enable, 0)
 
     def watch(self) -> None:
@@ -149,27 +172,27 @@ class Drive:
         option = int.from_bytes(self.node.get_data(c.ABORT, 0), "little", signed=True)
         if option == 1:
             self.fail(NO_MASTER)
-        elif option in (2, 3):  # no loop of its own could slow it down: its quick stop takes the torque away, too
+        elif option in (2, 3):  # its quick stop takes the torque away, too (605A)
             with self._lock:
                 before = self.state
                 self.state = ordered(self.state, HALT_QUICKLY if option == 3 else DISABLE_VOLTAGE)
                 self.state = ordered(self.state, DISABLE_VOLTAGE) if self.state == QUICK_STOP else self.state
-                self._torque = 0 if self.state != before else self._torque
+                self._demand = 0 if self.state != before else self._demand
                 put(self.plant.state.lines, self.wiring.enable, int(self.state == ENABLED))
 
 
-def drive_of(file: Any, node: int, overrides: Sequence[str] = (), **more: Any) -> Drive:
-    """The drive of an axis file, with the amplifier and the mechanics that it describes."""
+def drive_of(file: Any, node: int, overrides: Sequence[str] = (), mode: str = "torque", **more: Any) -> Drive:
+    """The drive of an axis file, with the amplifier and the mechanics that it describes, and its loops if need be."""
     spec = read_axis(file, overrides).spec
-    plant, wiring = METHODS[spec.axis.method].machine(spec)
+    plant, wiring = METHODS[spec.axis.method].machine(spec, mode=mode)
     return Drive(plant, wiring, node, **more)
 
 
 def serve(file: Any, address: str, left: threading.Event, overrides: Sequence[str] = (), **more: Any) -> Drive:
-    """Be the drive of an axis file at an address, ``slcan:/dev/pts/3@5``, until `left` is set."""
-    bus, node = read_address(address)
+    """Be the drive of an axis file at an address, ``slcan:/dev/pts/3@5?mode=velocity``, until `left` is set."""
+    bus, node, mode = read_address(address)
     network: Any = canopen.Network()
-    drive = drive_of(file, node, overrides, **more)
+    drive = drive_of(file, node, overrides, mode, **more)
     network.connect(**bus)
     try:
         drive.join(network)

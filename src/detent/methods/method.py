@@ -161,6 +161,7 @@ class Wiring:
     hardware: str  # what the axis file says that the drive says of itself; empty where it says nothing
     mode: str = "torque"  # what is demanded: a torque, a "velocity" [m/s] or a "position" [m]
     zero: str = ""  # of a position demand: the position of count 0 [m]
+    effort: str = ""  # takes what the loops of the drive give, where `torque` says how much that is; none where not
     samples: str = ""  # takes the number of samples that were heard of; none where nobody asks
     firmware: bytes = b""  # parameters of the controller, where the other end may run it
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import struct
 import subprocess
 import sys
 from dataclasses import replace
@@ -27,7 +28,11 @@ from detent.errors import (
     AxisError,
     DetentError,
 )
+from detent.faces.cia402 import Drive
 from detent.methods.cascade.controller import CascadeLines
+from detent.methods.cascade.led import LedCascade, led_wiring
+from detent.methods.load import load_spec
+from detent.methods.method import Plant
 from detent.operate.drivers import cia402
 from detent.operate.drivers.canopen_drive import CanopenDrive, read_address
 from detent.operate.drivers.driver import Link, driver_of
@@ -44,7 +49,8 @@ SAID = "canopen 0x2a.0x1.0x3.0x7"
 @pytest.mark.parametrize(
     "choice",
     ["canopen:", "canopen:can0@5", "canopen:socketcan:can0", "canopen:socketcan:can0@0", "canopen:socketcan:can0@127",
-     "canopen:socketcan:can0@5?speed=1", "canopen:socketcan:can0@5?bitrate=fast", "modbus:x", "sim:here", ""],
+     "canopen:socketcan:can0@5?mode=force", "canopen:socketcan:can0@5?speed=1",
+     "canopen:socketcan:can0@5?bitrate=fast", "modbus:x", "sim:here", ""],
 )  # fmt: skip
 def test_a_wrong_choice_of_a_driver_says_what_is_expected(choice):
     with pytest.raises(DetentError, match=r"expected: .*; try: "):
@@ -53,7 +59,9 @@ def test_a_wrong_choice_of_a_driver_says_what_is_expected(choice):
 
 def test_the_plant_of_the_file_needs_no_driver_and_a_bus_has_a_rate():
     assert driver_of("sim") is None
-    assert read_address("virtual:a@b@5") == ({"interface": "virtual", "channel": "a@b", "bitrate": 1_000_000}, 5)
+    bus = {"interface": "virtual", "channel": "a@b", "bitrate": 1_000_000}
+    assert read_address("virtual:a@b@5") == (bus, 5, "torque")
+    assert read_address("virtual:a@b@5?mode=position") == (bus, 5, "position")
 
 
 def test_without_the_packages_it_says_what_to_install(monkeypatch):
@@ -109,11 +117,11 @@ def test_a_controlword_leads_where_cia_402_says(word, state, then):
 class Loop:
     """The loop's side of the wires, without a loop."""
 
-    def __init__(self) -> None:
+    def __init__(self, lines: Any = CascadeLines) -> None:
         self.wires: Any = Wires()
         self.operation: Any = Operation(state=ENABLED)
-        self.lines: Any = CascadeLines()
-        self.ends = Ends(self.wires, CascadeLines, 0.03)
+        self.lines: Any = lines()
+        self.ends = Ends(self.wires, lines, 0.03)
 
     def take(self, now: int) -> None:
         take_lines(self.wires, self.operation, self.lines, now)
@@ -195,10 +203,11 @@ def test_before_the_first_word_it_is_barred():
 class Wired:
     """A loop's side, a driver, and a drive before a machine that stands still."""
 
-    def __init__(self, drive: Any, channel: str, wanted: str = SAID) -> None:
-        self.loop, self.drive = Loop(), drive
-        driver = CanopenDrive(f"virtual:{channel}@5", 5.0)
-        self.link = Link(driver, replace(live_drive.machine_wiring(), hardware=wanted), self.loop.wires)
+    def __init__(self, drive: Any, channel: str, wanted: str = SAID, mode: str = "torque") -> None:
+        wiring = live_drive.machine_wiring(mode)
+        self.loop, self.drive = Loop(wiring.lines), drive
+        driver = CanopenDrive(f"virtual:{channel}@5?mode={mode}", 5.0)
+        self.link = Link(driver, replace(wiring, hardware=wanted), self.loop.wires)
 
     def go(self, times: int, **lines: float) -> None:
         """So many exchanges, the loop awake in each."""
@@ -235,6 +244,103 @@ def test_positions_go_on_where_the_word_of_the_drive_wraps():
             wired.go(1)
             assert wired.loop.lines.motor.count == count
         wired.link.close()
+
+
+def test_a_drive_is_told_a_velocity_in_its_own_unit_and_none_without_its_enable():
+    with live_drive.still_drive("velocity", "velocity", identity=live_drive.IDENTITY) as drive:
+        drive._keep(cia402.VELOCITY_UNIT, 0, 0xFDB44700)  # thousandths of a revolution of 10 mm in a minute
+        wired = Wired(drive, "velocity", mode="velocity")
+        wired.go(4, velocity=0.1)
+        assert struct.unpack("<Hi", drive._told)[1] == 0
+        wired.go(5, enable=1, zero=-0.5)
+        assert (drive.state, struct.unpack("<Hi", drive._told)[1]) == (ENABLED, 600_000)
+        assert wired.loop.lines.samples == 9
+        for _ in range(round(0.11 / live_drive.SAMPLE)):  # nobody steers
+            wired.link.exchange()
+        assert (drive.state != ENABLED, struct.unpack("<Hi", drive._told)[1], drive.torque) == (True, 0, 0)
+        wired.link.close()
+
+
+def test_a_drive_that_closes_its_own_loops_tells_its_torque_as_the_command_that_makes_it():
+    with live_drive.still_drive("effort", "velocity", identity=live_drive.IDENTITY, rated=2.8) as drive:
+        wired = Wired(drive, "effort", mode="velocity")
+        drive.plant.state.lines.command = -5.0
+        wired.go(9, enable=1)
+        assert (drive.torque, wired.loop.lines.command) == (-500, pytest.approx(-5.0, abs=1e-9))
+        wired.go(2, enable=0)
+        assert (drive.torque, wired.loop.lines.command) == (0, 0.0)
+        wired.link.close()
+
+
+def test_a_drive_of_an_axis_whose_torque_per_command_is_not_known_is_not_asked_for_it():
+    spec = load_spec(live_drive.FILE, ['drive.input="voltage"'])
+    wiring = led_wiring(spec, "position")
+    state: Any = LedCascade()
+    drive = Drive(Plant(state, state, lambda: None), wiring, live_drive.NODE)
+    state.lines.command = 5.0
+    with live_drive.joined(drive, "no effort"):
+        driver = CanopenDrive("virtual:no effort@5?mode=position", 5.0)
+        assert "tells" not in {fact.name for fact in driver.open(wiring)}
+        drive.state = ENABLED
+        assert drive.torque == 0
+        driver.close()
+
+
+def test_a_drive_is_told_the_place_where_it_is_until_it_is_enabled_and_its_word_wraps():
+    with live_drive.still_drive("position", "position", identity=live_drive.IDENTITY) as drive:
+        wired, lines = Wired(drive, "position", mode="position"), drive.plant.state.lines
+        lines.motor.count = 5 << 30
+        wired.go(4, place=7.0)
+        there, here = (5 << 30) * 1e-6, wired.loop.lines.motor.count  # which knows of the last 32 bits
+        assert (lines.place, here) == (pytest.approx(there, abs=1e-9), 1 << 30)
+        wired.go(6, enable=1, zero=-0.5, place=here * 1e-6 - 0.5 + 0.003)  # 3 mm from here, count 0 at -0.5 m
+        assert (lines.place, lines.enable) == (pytest.approx(there + 0.003, abs=1e-9), 1)
+        lines.motor.count += 3000
+        wired.go(2, enable=0)
+        assert (lines.place, lines.enable) == (pytest.approx(there + 0.003, abs=1e-9), 0)
+        wired.link.close()
+        assert drive.state == SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize(
+    ("mode", "offered", "got"),
+    [("velocity", "position", r"without cyclic synchronous velocity .*try: \?mode=position"),
+     ("torque", "velocity", r"without cyclic synchronous torque .*try: \?mode=velocity")],
+)  # fmt: skip
+def test_a_drive_without_the_mode_is_refused_and_another_named(mode, offered, got):
+    with live_drive.still_drive("mode", offered), pytest.raises(DetentError, match=got):
+        CanopenDrive(f"virtual:mode@5?mode={mode}", 5.0).open(live_drive.machine_wiring(mode))
+
+
+def test_a_drive_that_stays_in_another_mode_is_refused(monkeypatch):
+    monkeypatch.setattr("detent.faces.cia402.Drive._written", lambda *_, **__: None)  # says yes to any
+    with live_drive.still_drive("stays", "velocity") as drive:
+        drive._mode = cia402.CYCLIC["position"]
+        with pytest.raises(DetentError, match=r"mode of operation 8 \(6061\) after 9"):
+            CanopenDrive("virtual:stays@5?mode=velocity", 5.0).open(live_drive.machine_wiring("velocity"))
+
+
+@pytest.mark.parametrize(
+    ("unit", "sample", "got"),
+    [(0x00010300, 0.25e-3, "unit 0x00010300"), (0xF7B50300, 0.25e-3, "0xf7b50300"),
+     (0x00B50300, 1.0 / 3.0, "cannot be told"), (0x00B50300, 1e-3, "takes no demand every 1 ms")],
+)  # fmt: skip
+def test_a_drive_of_other_units_or_another_pace_is_refused(unit, sample, got):
+    with live_drive.still_drive("units", "velocity") as drive:
+        drive._keep(cia402.VELOCITY_UNIT, 0, unit)
+        wiring = replace(live_drive.machine_wiring("velocity"), sample=sample)
+        with pytest.raises(DetentError, match=got):
+            CanopenDrive("virtual:units@5?mode=velocity", 5.0).open(wiring)
+
+
+def test_a_coarse_velocity_is_pointed_out():
+    with live_drive.still_drive("coarse", "velocity") as drive:
+        drive._keep(cia402.VELOCITY_UNIT, 0, 0x01B44700)  # 10 rpm: 1.67 mm/s
+        driver = CanopenDrive("virtual:coarse@5?mode=velocity", 5.0)
+        facts = {fact.name: fact for fact in driver.open(live_drive.machine_wiring("velocity"))}
+        assert "375 of them" in facts["takes"].caution
+        assert "0.00167 m/s" in facts["takes"].value
+        driver.close()
 
 
 @pytest.mark.parametrize("wanted", ["", "canopen 0x1.0x1.0x1.0x1"])

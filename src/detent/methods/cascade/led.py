@@ -112,11 +112,14 @@ def led_wiring(spec: CascadeSpec, mode: str) -> Wiring:
     for met, got, allowed, remedy in refusals:
         if met:
             raise DetentError(f"{spec.axis.name}: got {got} and a drive; expected: {allowed}; try: {remedy}")
+    motor = spec.motor if spec.drive.input == "current" else None
+    torque = 0.0 if motor is None else motor.torque_constant * spec.drive.current_per_volt
     return Wiring(
         lines=LedLines, enable="enable", position="motor.count", demand="place" if mode == "position" else "velocity",
-        count=spec.encoder.resolution, turn=2.0 * math.pi * spec.radius / spec.encoder.resolution, torque=0.0,
-        largest=spec.limits.speed, sample=spec.method.sample_period, hardware=spec.hardware.id if spec.hardware else "",
-        mode=mode, zero="zero", samples="samples", firmware=bytes(build_cascade(spec).controller),
+        count=spec.encoder.resolution, turn=2.0 * math.pi * spec.radius / spec.encoder.resolution, torque=torque,
+        largest=spec.method.velocity_limit, sample=spec.method.sample_period,
+        hardware=spec.hardware.id if spec.hardware else "", mode=mode, zero="zero" if mode == "position" else "",
+        effort="command" if torque else "", samples="samples", firmware=bytes(build_cascade(spec).controller),
     )  # fmt: skip
 
 
@@ -132,24 +135,33 @@ def led(spec: CascadeSpec, operation: Callable[..., OperationParams], mode: str)
 
 
 def led_machine(spec: CascadeSpec, mode: str) -> tuple[Plant, Wiring]:
-    """The axis of the file with its loops, as a drive that is told a position or a velocity in each sample."""
+    """The axis of the file with its loops, as a drive that is told a position or a velocity in each sample.
+
+    It knows nothing else: what the axis takes to accelerate, and against friction, its integral finds.
+    """
     host, lines = CascadeHost(spec), led_wiring(spec, mode)
     state: Any = LedCascade()
     c: Any = host.controller
     c.on = c.known = c.guarded = 0  # it is its master that watches
+    law = host.params.controller.law
+    forward = law.feed_forward
+    forward.acceleration = forward.viscous = forward.coulomb_positive = forward.coulomb_negative = 0.0
     if mode == "velocity":
-        host.params.controller.law.cascade.position_gain = 0.0
-        host.params.controller.law.feed_forward.velocity = 1.0
+        law.cascade.position_gain, forward.velocity = 0.0, 1.0
     feed, wires = (lay_ready(np.zeros(0)),) * 4, state.lines
     advance(host.params, host.state, 0, *NO_ROWS, *feed)  # compiles
 
     def sample() -> None:
         """The time between two samples, with what was told before it."""
+        ref = c.reference
         if wires.enable and not c.on:
             engage(c)
-        c.on, ref = wires.enable, c.reference
-        ref.position, ref.velocity, ref.acceleration = wires.place, wires.velocity, wires.acceleration
+            ref.position = wires.place
+        c.on = wires.enable
+        ref.velocity = wires.velocity if mode == "velocity" else (wires.place - ref.position) / lines.sample
+        ref.position = wires.place
         advance(host.params, host.state, host.sample_ticks, *NO_ROWS, *feed)
+        wires.command = host.state.lines.command
         wires.motor.count, wires.home = host.state.lines.motor.count, host.state.lines.home
 
     wires.motor.count = host.state.lines.motor.count

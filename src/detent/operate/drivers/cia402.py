@@ -29,14 +29,31 @@ from detent.errors import DRIVE_FAULT, MOTOR_LOAD, OVER_CURRENT, SENSOR_LOST
 
 CONTROL, STATUS, ERROR_CODE = 0x6040, 0x6041, 0x603F
 MODE, MODE_SHOWN, MODES = 0x6060, 0x6061, 0x6502
-POSITION, TORQUE, RATED_TORQUE, TORQUE_SHOWN = 0x6064, 0x6071, 0x6076, 0x6077
+POSITION, RATED_TORQUE, TORQUE_SHOWN = 0x6064, 0x6076, 0x6077
+TORQUE, VELOCITY, PLACE = 0x6071, 0x60FF, 0x607A  # targets
+VELOCITY_UNIT, CYCLE = 0x60A9, 0x60C2
 ABORT, QUICK_STOP_OPTION, FAULT_REACTION_OPTION, FOLLOWING = 0x6007, 0x605A, 0x605E, 0x6065
 IDENTITY, CONSUMER, PRODUCER, RESOLUTION = 0x1018, 0x1016, 0x1017, 0x608F
-RX, RX_MAP, TX, TX_MAP = 0x1400, 0x1600, 0x1800, 0x1A00
-CYCLIC_TORQUE = 10  # mode of operation
+RX, RX_MAP, TX, TX_MAP, TX_2, TX_2_MAP = 0x1400, 0x1600, 0x1800, 0x1A00, 0x1801, 0x1A01
 MASTER = 127  # node number under which the master's heartbeat is sent
 SYNC = 0x80
 OFF = 0xFFFFFFFF  # following error window that watches nothing
+
+
+class Cyclic(NamedTuple):
+    """A cyclic synchronous mode: its number, the object that takes the demand, and that as `struct` packs it."""
+
+    number: int
+    target: int
+    code: str
+
+    @property
+    def bit(self) -> int:
+        """Of the supported modes (6502)."""
+        return 1 << (self.number - 1)
+
+
+CYCLIC = {"torque": Cyclic(10, TORQUE, "h"), "velocity": Cyclic(9, VELOCITY, "i"), "position": Cyclic(8, PLACE, "i")}
 
 
 class Entry(NamedTuple):
@@ -65,9 +82,12 @@ OBJECTS = (
     Entry(POSITION, "Position actual value", INTEGER32, "ro"),
     Entry(FOLLOWING, "Following error window", UNSIGNED32, "rw", OFF),
     Entry(TORQUE, "Target torque", INTEGER16),
+    Entry(PLACE, "Target position", INTEGER32),
+    Entry(VELOCITY, "Target velocity", INTEGER32),
+    Entry(VELOCITY_UNIT, "SI unit velocity", UNSIGNED32, "ro", 0x00B50300),
     Entry(RATED_TORQUE, "Motor rated torque", UNSIGNED32, "rw", 1000),
     Entry(TORQUE_SHOWN, "Torque actual value", INTEGER16, "ro"),
-    Entry(MODES, "Supported drive modes", UNSIGNED32, "ro", 1 << (CYCLIC_TORQUE - 1)),
+    Entry(MODES, "Supported drive modes", UNSIGNED32, "ro", CYCLIC["torque"].bit),
 )
 RECORDS: dict[tuple[int, str], tuple[Entry, ...]] = {
     (IDENTITY, "Identity object"): (
@@ -78,12 +98,19 @@ RECORDS: dict[tuple[int, str], tuple[Entry, ...]] = {
     (RESOLUTION, "Position encoder resolution"): (
         Entry(1, "Encoder increments", UNSIGNED32, "ro", 1), Entry(2, "Motor revolutions", UNSIGNED32, "ro", 1),
     ),
+    (CYCLE, "Interpolation time period"): (
+        Entry(1, "Value", UNSIGNED8, "rw", 1), Entry(2, "Power of ten", INTEGER8, "rw", -3),
+    ),
     (RX, "RPDO communication parameter"): (
         Entry(1, "RPDO COB-ID", UNSIGNED32), Entry(2, "RPDO transmission type", UNSIGNED8, "rw", 1),
     ),
     (TX, "TPDO communication parameter"): (
         Entry(1, "TPDO COB-ID", UNSIGNED32), Entry(2, "TPDO transmission type", UNSIGNED8, "rw", 1),
     ),
+    (TX_2, "TPDO communication parameter 2"): (
+        Entry(1, "TPDO 2 COB-ID", UNSIGNED32), Entry(2, "TPDO 2 transmission type", UNSIGNED8, "rw", 1),
+    ),
+    (TX_2_MAP, "TPDO mapping parameter 2"): (Entry(1, "TPDO 2 map 1", UNSIGNED32, "rw", TORQUE_SHOWN << 16 | 16),),
     (RX_MAP, "RPDO mapping parameter"): (
         Entry(1, "RPDO map 1", UNSIGNED32, "rw", CONTROL << 16 | 16),
         Entry(2, "RPDO map 2", UNSIGNED32, "rw", TORQUE << 16 | 16),
@@ -110,14 +137,14 @@ def dictionary(node: int) -> ObjectDictionary:
     for entry in OBJECTS:
         made.add_object(_variable(entry, entry.place))
     for (index, name), parts in RECORDS.items():
-        record: Any = (ODArray if index in (CONSUMER, RX_MAP, TX_MAP) else ODRecord)(name, index)
-        access = "rw" if index in (RX_MAP, TX_MAP) else "ro"
+        record: Any = (ODArray if index in (CONSUMER, RX_MAP, TX_MAP, TX_2_MAP) else ODRecord)(name, index)
+        access = "rw" if index in (RX_MAP, TX_MAP, TX_2_MAP) else "ro"
         record.add_member(_variable(Entry(0, "Number of entries", UNSIGNED8, access, len(parts)), index))
         for entry in parts:
             record.add_member(_variable(entry, index, entry.place))
         made.add_object(record)
     words: Any = made
-    words[RX][1].default, words[TX][1].default = 0x200 + node, 0x180 + node
+    words[RX][1].default, words[TX][1].default, words[TX_2][1].default = 0x200 + node, 0x180 + node, 0x280 + node
     return made
 
 
@@ -165,6 +192,38 @@ def orders_of(word: int, state: int) -> tuple[int, ...]:
     if word & 0x08:
         return (SWITCH_ON, ENABLE_OPERATION) if state == READY else (ENABLE_OPERATION,)
     return (DISABLE_OPERATION,) if state == ENABLED else (SWITCH_ON,)
+
+
+_LENGTHS, _TIMES = {0xB4: True, 0xB5: False}, {0x03: 1.0, 0x47: 60.0}  # revolutions, increments; second, minute
+
+
+def velocity_unit(word: int, turn: float) -> float:
+    """Counts per second that are 1 of a velocity, of a motor with so many counts in a turn; 0 where that is not known.
+
+    The word (60A9) has a power of ten, what is counted, and in what time; the numbers are those of CiA 303-2.
+
+    >>> velocity_unit(0x00B50300, 4000), velocity_unit(0xFDB44700, 6000)
+    (1.0, 0.1)
+    """
+    what, time = word >> 16 & 0xFF, word >> 8 & 0xFF
+    if what not in _LENGTHS or time not in _TIMES:
+        return 0.0
+    power = ((word >> 24) + 128) % 256 - 128
+    counts = (turn if _LENGTHS[what] else 1.0) / _TIMES[time]
+    return counts * 10.0**power if power >= 0 else counts / 10.0**-power
+
+
+def cycle_of(time: float) -> tuple[int, int]:
+    """A time [s] as 60C2 has it, value and power of ten; a value of 0 where it does not go into that.
+
+    >>> cycle_of(0.25e-3), cycle_of(1e-3), cycle_of(1.0 / 3.0)
+    ((25, -5), (1, -3), (0, 0))
+    """
+    for power in range(0, -8, -1):
+        value = round(time * 10.0**-power)
+        if 1 <= value <= 255 and abs(value - time * 10.0**-power) < 1e-6 * value:
+            return value, power
+    return 0, 0
 
 
 def identity_text(parts: list[int]) -> str:
