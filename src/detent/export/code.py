@@ -47,8 +47,14 @@ def template(file: str, **given: Any) -> str:
         undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["comment"] = comment_of
+    environment.filters["quoted"] = _quoted
     text = resources.files("detent.export").joinpath(file).read_text(encoding="utf-8")
     return environment.from_string(text).render(**given)
+
+
+def _quoted(text: str) -> str:
+    """Text between quotation marks of ASAP2, on one line."""
+    return " ".join(text.replace("\\", "\\\\").replace('"', '\\"').split())
 
 
 def place_of(path: str, controller: str = "", lines: str = "", parameters: str = "") -> str:
