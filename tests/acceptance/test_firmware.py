@@ -1,6 +1,8 @@
 """Numbered tests of the firmware specification, as far as it is built: its control units, here and emulated."""
 
+import csv
 import ctypes
+import json
 import os
 import shutil
 import subprocess
@@ -12,6 +14,7 @@ import pytest
 
 import detent
 from detent.export.code import FLAGS, WARNINGS
+from detent.export.linked import fill_addresses
 from detent.export.teeth import mutants, reach
 from detent.export.unit import unit_named
 from detent.export.verify import TARGETS, verify
@@ -204,17 +207,28 @@ def test_24_an_export_elsewhere_is_the_same_byte_for_byte(exported, tmp_path):
             assert path.read_bytes() == (tmp_path / "there" / path.relative_to(folder)).read_bytes(), path.name
 
 
-def test_31_a_parameter_out_of_its_range_is_told_by_its_number(exported, tmp_path):
-    place, name = copied(exported("cascade"), tmp_path / "out")
+@pytest.mark.parametrize(("method", "count"), [("cascade", 4), ("phase_servo", 7), ("rotary_table", 3)])
+def test_31_a_parameter_out_of_its_range_is_told_by_its_number(exported, tmp_path, method, count):
+    place, name = copied(exported(method), tmp_path / "out")
+    with (place / "params.csv").open(newline="") as stream:
+        found = list(csv.DictReader(stream))
+    spoiled = [(row, end + by) for row in found if row["range"] and row["tunable"] == "yes"
+               for end, by in zip(map(int, row["range"].split(" to ")), (-1, 1), strict=True)]  # fmt: skip
+    assert len(spoiled) == 2 * count
+    lines = "".join(
+        f"p = {name}_defaults; {row['expression'].replace('p->', 'p.')} = {value};\n"
+        f'printf("%u\\n", (unsigned){name}_check_params(&p));\n'
+        for row, value in spoiled
+    )
     (place / "check.c").write_text(
-        f'#include "{name}.h"\nint main(void) {{\n    {name}_params p = {name}_defaults;\n'
-        f"    if ({name}_check_params(&p) != 0) {{ return 255; }}\n    p.load_sensor.span = 64;\n"
-        f"    return (int){name}_check_params(&p);\n}}\n"
+        f'#include <stdio.h>\n#include "{name}.h"\nint main(void) {{\n{name}_params p = {name}_defaults;\n{lines}'
+        f"return (int){name}_check_params(&{name}_defaults);\n}}\n"
     )
     made = run(f"gcc {FLAGS} {WARNINGS} -Werror check.c {name}.c {name}_params.c -o check -lm", place)
     assert made.returncode == 0, made.stderr
-    row = (place / "params.csv").read_text().splitlines()[run("./check", place).returncode]
-    assert row.split(",")[1] == "load_sensor.span"
+    done = run("./check", place)
+    told = [found[int(one) - 1]["name"] for one in done.stdout.split()]
+    assert (done.returncode, told) == (0, [row["name"] for row, _ in spoiled])
 
 
 def test_11_plain_steps_make_the_same_vectors_byte_for_byte(exported, tmp_path):
@@ -316,3 +330,71 @@ def test_22_three_axes_in_one_program_keep_to_themselves(exported, tmp_path):
     wanted = [read_manifest(place) for place, _ in made]
     assert done.stdout.splitlines() == [f"equal {one['ticks']} {one['hash']}" for one in wanted]
     assert done.returncode == 0
+
+
+def rows(file: Path) -> list[dict[str, str]]:
+    with file.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+READER = Path(sys.executable).with_name("pya2l")
+
+
+def described(file: Path) -> dict[str, dict]:
+    """What another reader finds: by its symbol everything that can be tuned or measured."""
+    made = file.with_suffix(".json")
+    done = run(f"{READER} -c {file} to_json -e 1 -o {made}", file.parent)
+    assert (done.returncode, done.stderr) == (0, "")
+    (module,) = json.loads(made.read_text())["PROJECT"]["MODULE"]
+    found = [*module["CHARACTERISTIC"], *module["MEASUREMENT"]]
+    by_symbol = {one["SYMBOL_LINK"]["SymbolName"]["Value"]: one for one in found}
+    assert len(by_symbol) == len(found) == len({one["Name"]["Value"] for one in found})
+    return by_symbol
+
+
+@pytest.mark.parametrize("method", ["cascade", "phase_servo", "rotary_table"])
+def test_32_another_reader_finds_every_parameter_and_register_in_the_description(exported, tmp_path, method):
+    place, name = copied(exported(method), tmp_path / "out")
+    found = described(place / f"{name}.a2l")
+    tuned = [row for row in rows(place / "params.csv") if row["tunable"] == "yes"]
+    wanted = [*tuned, *rows(place / "registers.csv")]
+    assert len(wanted) == len(found)
+    for row in wanted:
+        one = found[f"{name}_{row['expression'].replace('->', '.')}"]
+        assert one["Name"]["Value"].endswith(f".{row['name']}")
+        assert one["LongIdentifier"]["Value"] == row["meaning"]
+        assert one["PHYS_UNIT"]["Unit"]["Value"] == row["unit"]
+        if row["range"]:
+            limits = [float(end) for end in row["range"].split(" to ")]
+            assert [float(one[end]["Value"]) for end in ("LowerLimit", "UpperLimit")] == limits
+        if row["length"] != "0":
+            assert one["MATRIX_DIM"]["XDim"]["Value"] == int(row["length"])
+    spoiled = place / "spoiled.a2l"
+    spoiled.write_text((place / f"{name}.a2l").read_text().replace("/end MEASUREMENT", "", 1))
+    assert run(f"{READER} -c {spoiled} to_json", place).returncode != 0
+
+
+@pytest.mark.parametrize(("method", "compiler"), [("cascade", "gcc"), ("phase_servo", "clang -gdwarf-4")])
+def test_32_addresses_are_those_of_nm(exported, tmp_path, method, compiler):
+    if not shutil.which(compiler.split()[0]):
+        pytest.skip(f"not installed: {compiler.split()[0]}")
+    place, name = copied(exported(method), tmp_path / "out")
+    found = [row for table in ("params.csv", "registers.csv") for row in rows(place / table) if row["expression"]]
+    symbols = [f"{name}_{row['expression'].replace('->', '.')}" for row in found]
+    lines = "".join(
+        f'    printf("%zu\\n", (size_t)((char *)&{s} - (char *)&{s.partition(".")[0]}));\n' for s in symbols
+    )
+    (place / "app.c").write_text(
+        f'#include <stdio.h>\n#include "{name}.h"\n{name}_params {name}_p;\n{name}_controller {name}_c;\n'
+        f"{name}_lines {name}_l;\nint main(void) {{\n{lines}    return 0;\n}}\n"
+    )
+    made = run(f"{compiler} {FLAGS} -g app.c {name}.c {name}_params.c -o app -lm", place)
+    assert made.returncode == 0, made.stderr
+    offsets = [int(one) for one in run("./app", place).stdout.split()]
+    told = {row.split()[2]: int(row.split()[0], 16) for row in run("nm --defined-only app", place).stdout.splitlines()}
+    wanted = {s: told[s.partition(".")[0]] + offset for s, offset in zip(symbols, offsets, strict=True)}
+    assert fill_addresses(place, place / "app", place / "app.a2l") == wanted
+    written = described(place / "app.a2l")
+    for symbol, one in written.items():
+        at = one["Address"] if "Address" in one else one["ECU_ADDRESS"]["Address"]
+        assert int(at["Value"]) == wanted[symbol]

@@ -32,8 +32,8 @@ def edge_cycle(a: Numbers, b: Numbers, place: Numbers, command: Numbers, through
     The state goes from sample to sample by `a`, shape (n, n), of the loop cut open where the place is read; what is
     read there does `b`, shape (n,), to it, and `through` to the command in the same sample. `place` and `command`, of
     shape (n,), say over the state where the encoder stands and what the loop commands. It is the cycle for a count
-    of 1; None where none up to 256 samples long on each side exists. Tsypkin 1984, Relay Control Systems, ch. 6; checked by
-    tests/unit/analysis/test_count_edge.py.
+    of 1; None where none up to 256 samples long on each side exists. Tsypkin 1984, Relay Control Systems, ch. 6;
+    checked by tests/unit/analysis/test_count_edge.py.
     """
     size, found = len(a), None
     power, driven = np.eye(size), np.zeros(size)  # A^k, and the sum of A^j B over j < k

@@ -22,7 +22,17 @@ QUIET = "Print only warnings and errors, and the output of --json: `detent -q ru
 LOGS = "(.csv, .h5, .parquet, .mat, .npz, .jsonl)"  # recordings that can be read
 
 
-class Commands(TyperGroup):
+class Verbs(TyperGroup):
+    """Verbs, each of which the help tells with its whole first sentence."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - click hands it over
+        """The list of verbs."""
+        rows = [(name, verb.get_short_help_str(limit=1000)) for name, verb in self.commands.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+
+class Commands(Verbs):
     """The verbs. Errors that detent raises on purpose become one message and an exit status, never a traceback."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -66,12 +76,6 @@ class Commands(TyperGroup):
             sys.stderr.write(shown(told.getvalue()))
             status = error.exit_code
         sys.exit(status)
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - click hands it over
-        """The list of verbs, each with its whole first sentence."""
-        rows = [(name, verb.get_short_help_str(limit=1000)) for name, verb in self.commands.items()]
-        with formatter.section("Commands"):
-            formatter.write_dl(rows)
 
 
 def _tell_problem(error: DetentError, *, as_json: bool) -> None:

@@ -110,9 +110,13 @@ def _tables(model: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
 
 
 def commands() -> dict[str, Any]:
-    """The commands as the command line knows them."""
+    """The commands as the command line knows them, those of a group by both their words."""
     group: Any = typer.main.get_command(app)
-    return dict(group.commands)
+    found: dict[str, Any] = {}
+    for name, command in group.commands.items():
+        inner = getattr(command, "commands", None)
+        found |= {f"{name} {one}": two for one, two in inner.items()} if inner else {name: command}
+    return found
 
 
 def parameter_row(parameter: Any) -> tuple[str, str, str]:

@@ -1,13 +1,12 @@
 """`detent export` and `detent verify`: an axis as firmware, and the proof that it is the one that was simulated."""
 
 from dataclasses import asdict
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from detent.cli.app import NOT_DONE, File, Job, Json, Set, app, option
+from detent.cli.app import NOT_DONE, File, Force, Job, Json, Set, Verbs, app, option
 from detent.cli.terminal import print_json, progress_bar, say, split_names, tell
 
 OUTPUT = "Folder for the export: a new one, an empty one, or that of an earlier export."
@@ -21,18 +20,20 @@ ON = (
 )
 MUTANTS = "Change one thing of the C at so many places, one at a time, and tell which changes no vector finds."
 BAR = "Tell what the vectors do not reach; fail where they take fewer of the branch outcomes [%]."
+Folder = Annotated[Path, typer.Argument(help="What `detent export firmware` wrote.", show_default=False)]
 AGAINST = "Axis file: make the export anew, with --job as then, and compare."
 
 
-class Form(StrEnum):
-    """What an axis can be exported as."""
+ELF = "The application: linked, with debug information."
+VARIABLES = "Its variables of parameters, controller and lines, comma-separated. Default: NAME_p, NAME_c and NAME_l."
+DESCRIPTION = "Default: the name of the application with the ending .a2l"
 
-    FIRMWARE = "firmware"
+export = typer.Typer(cls=Verbs, no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(export, name="export", help="Write an axis as firmware; fill in the addresses of a linked program.")
 
 
-@app.command()
-def export(
-    form: Annotated[Form, typer.Argument(help="What to write: firmware, the controller as C99.", show_default=False)],
+@export.command()
+def firmware(
     file: File,
     output: Annotated[Path, option("--output -o", "FOLDER", OUTPUT)],
     job: Job = None,
@@ -49,7 +50,6 @@ def export(
 
     Exit status: 0 written, 1 refused (FW01 to FW13: why, and what to do), 2 wrong input.
     """
-    del form  # there is one
     from detent.axis import load
     from detent.export.write import export_firmware
 
@@ -72,9 +72,33 @@ def export(
     tell(f"next: detent verify {made.folder}")
 
 
+@export.command()
+def addresses(
+    folder: Folder,
+    elf: Annotated[Path, option("--elf", "FILE", ELF, show_default=False)],
+    variables: Annotated[list[str] | None, option("--variables", "NAMES", VARIABLES)] = None,
+    output: Annotated[Path | None, option("--output -o", "FILE", DESCRIPTION)] = None,
+    *,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write the description of an export for calibration tools (A2L), with the addresses of a linked program.
+
+    Exit status: 0 written, 2 wrong input: no export, or a program that was not made with it.
+    """
+    from detent.export.linked import fill_addresses
+
+    place = output or elf.with_suffix(".a2l")
+    found = fill_addresses(folder, elf, place, split_names(variables), force=force)
+    if as_json:
+        print_json({"file": str(place), "addresses": found})
+    else:
+        say(f"{len(found)} addresses in {place}", "bold green")
+
+
 @app.command()
 def verify(
-    folder: Annotated[Path, typer.Argument(help="What `detent export firmware` wrote.", show_default=False)],
+    folder: Folder,
     on: Annotated[list[str] | None, option("--on", "NAMES", ON)] = None,
     against: Annotated[Path | None, option("--against", "FILE", AGAINST)] = None,
     mutants: Annotated[int, option("--mutants", "NUMBER", MUTANTS)] = 0,

@@ -17,7 +17,7 @@ from detent.export.drawn import FAR, PLACES, SEED, Chance, Row, drawn_from
 from detent.export.translate.program import Function, Program
 from detent.export.translate.text import code_text, comment_of, signals_text, struct_texts
 from detent.export.translate.values import c_field, interval_of, number, type_of_local
-from detent.export.unit import LARGE, ControlUnit, members, ranged
+from detent.export.unit import LARGE, ControlUnit, members
 from detent.export.vectors import Golden
 from detent.kernel.registers import Field, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
 
@@ -47,14 +47,20 @@ def template(file: str, package: Any = "detent.export", **given: Any) -> str:
         undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["comment"] = comment_of
+    environment.filters["quoted"] = _quoted
     text = resources.files(package).joinpath(file).read_text(encoding="utf-8")
     return environment.from_string(text).render(**given)
 
 
-def place_of(path: str, controller: str, lines: str) -> str:
-    """A leaf of controller or lines in C."""
+def _quoted(text: str) -> str:
+    """Text between quotation marks of ASAP2, on one line."""
+    return " ".join(text.replace("\\", "\\\\").replace('"', '\\"').split())
+
+
+def place_of(path: str, controller: str = "", lines: str = "", parameters: str = "") -> str:
+    """A leaf of controller, lines or parameters in C."""
     root, *parts = path.split(".")
-    return (controller if root == "c" else lines) + ".".join(c_field(part) for part in parts)
+    return {"c": controller, "l": lines, "p": parameters}[root] + ".".join(c_field(part) for part in parts)
 
 
 def in_c(unit: ControlUnit, leaf: Leaf, controller: str, lines: str) -> InC:
@@ -76,26 +82,32 @@ class Parameter:
 
     number: int
     name: str
-    expression: str
+    expression: str  # empty where it is no part of the structure
     width: str
+    length: int
     unit: str
     range: str
     default: str
-    fixed: str  # why it is no part of the structure; empty where it can be changed at run time
+    tunable: str  # yes where it can be changed at run time, else why not
     meaning: str
 
 
 def parameters(program: Program, params: Registers) -> Iterator[Parameter]:
     """Every parameter, in the order of declaration."""
     for count, (prefix, registers, field, width) in enumerate(_fields(params, "")):
-        fixed = "an option, folded into the code" if (type(registers), field.name) in program.options else ""
+        folded = (type(registers), field.name) in program.options
         value = getattr(registers, field.name)
         default = f"{len(value)} values" if field.length else repr(value)
-        claimed = "" if field.range is None else f"{field.range[0]} to {field.range[1]}"
-        expression = "" if fixed else "p->" + ".".join(c_field(one) for one in (prefix + field.name).split("."))
         yield Parameter(
-            count, prefix + field.name, expression, width.code, field.unit, claimed, default, fixed, field.doc
-        )
+            count, prefix + field.name, "" if folded else place_of(f"p.{prefix}{field.name}", parameters="p->"),
+            width.code, field.length, field.unit, range_text(field.range), default,
+            "an option, folded into the code" if folded else "yes", field.doc,
+        )  # fmt: skip
+
+
+def range_text(claimed: tuple[float, float] | None) -> str:
+    """A range as the tables tell it; empty where none is claimed."""
+    return "" if claimed is None else f"{claimed[0]} to {claimed[1]}"
 
 
 def _fields(registers: Registers, prefix: str) -> Iterator[tuple[str, Registers, Field, Width]]:
@@ -126,6 +138,7 @@ class Register:
     width: str
     length: int
     unit: str
+    range: str
     written_by: str
     meaning: str
 
@@ -135,7 +148,8 @@ def registers(unit: ControlUnit) -> Iterator[Register]:
     for count, leaf in enumerate(unit.leaves):
         expression = place_of(leaf.path, "c->", "l->")
         name = ("controller" if leaf.path[0] == "c" else "lines") + leaf.path[1:]
-        yield Register(count, name, expression, leaf.width.code, leaf.length, leaf.unit, leaf.by, leaf.doc)
+        claimed = range_text(leaf.range)
+        yield Register(count, name, expression, leaf.width.code, leaf.length, leaf.unit, claimed, leaf.by, leaf.doc)
 
 
 @dataclass(frozen=True)
@@ -174,15 +188,17 @@ def _initialiser(program: Program, registers: Registers, depth: int = 1) -> str:
     return "{\n" + "".join(rows) + "    " * (depth - 1) + "}"
 
 
-def _checks(program: Program, params: Registers) -> Iterator[dict[str, Any]]:
-    rows = {one.name: one for one in parameters(program, params)}
-    for path, _, (lo, hi) in ranged(params):
-        row = rows.get(path)
-        if row is None or row.fixed:
+def range_checks(program: Program, params: Registers) -> Iterator[dict[str, Any]]:
+    """Conditions of the parameters with a range, for each element of an array; what a width cannot hold needs none."""
+    for row, (_, _, field, width) in zip(parameters(program, params), _fields(params, ""), strict=True):
+        if field.range is None or not row.expression:
             continue
-        parts = [f"({row.expression} >= {number(lo).text})"] if lo > 0 or row.width[0] != "u" else []
-        parts += [f"({row.expression} <= {number(hi).text})"]
-        yield {"text": " && ".join(parts), "number": row.number + 1}
+        place, (lo, hi) = row.expression + ("[k]" if row.length else ""), field.range
+        least, most = (-math.inf, math.inf) if width.is_float else interval_of(width)
+        parts = [f"({place} >= {number(lo).text})"] if lo > least else []
+        parts += [f"({place} <= {number(hi).text})"] if hi < most else []
+        if parts:
+            yield {"text": " && ".join(parts), "number": row.number + 1, "length": row.length}
 
 
 def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick: str) -> dict[str, str]:
@@ -217,7 +233,7 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
         "source_hash": source_hash, "axis_hash": short_hash(bytes(params)), "layout_hash": f"{unit.layout_hash:08X}",
         "structs": struct_texts(program, (unit.params, unit.controller, unit.lines)), "signals": signals_text(program),
         "prototypes": "".join(_prototype(program, f) for f in program.steps.values() if f.entry),
-        "code": code, "checks": list(_checks(program, params)), "floats": floats, "images": list(images.items()),
+        "code": code, "checks": list(range_checks(program, params)), "floats": floats, "images": list(images.items()),
     }  # fmt: skip
     made = {f"{name}.h": template("unit.h.in", **given), f"{name}.c": template("unit.c.in", **given)}
     made[f"{name}_image.c"] = template("image.c.in", **given)

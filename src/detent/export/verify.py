@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from detent.axis import Axis
-from detent.errors import DetentError, InputError
+from detent.errors import DetentError
 from detent.export.code import FLAGS, WARNINGS, short_hash, template
 from detent.export.drawn import Chance, Row
 from detent.export.sizes import Sizes, sizes_of
 from detent.export.unit import unit_named
-from detent.export.write import MANIFEST, changed_files, export_firmware, read_manifest
+from detent.export.write import changed_files, export_firmware, manifest_of
 
 TIMEOUT = 600.0  # of one replay [s]
 TOLD = 20  # registers that are told of a difference
@@ -124,9 +124,7 @@ def verify(
         The folder is no export, or a target is none.
     """
     place = Path(folder)
-    manifest = read_manifest(place)
-    if manifest is None:
-        raise InputError.of_file(str(place), f"a folder without {MANIFEST}", "an export", "detent export firmware")
+    manifest = manifest_of(place)
     unknown = [name for name in on if name not in TARGETS]
     if unknown:
         raise DetentError(f"--on: got {', '.join(unknown)}; expected: {', '.join(TARGETS)}; name some of these")
@@ -285,9 +283,7 @@ def differences(folder: str | Path, axis: Axis, job: str | Path | None = None) -
         A sentence for each difference.
     """
     place = Path(folder)
-    manifest = read_manifest(place)
-    if manifest is None:
-        raise InputError.of_file(str(place), f"a folder without {MANIFEST}", "an export", "detent export firmware")
+    manifest = manifest_of(place)
     with tempfile.TemporaryDirectory() as made:
         new = export_firmware(
             axis, Path(made) / "new", job=job, motor=manifest["motor"], prefix=manifest["name"],

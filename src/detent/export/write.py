@@ -4,14 +4,15 @@ import hashlib
 import json
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, cast
 
 from detent import __version__
 from detent.axis import Axis
 from detent.errors import DetentError, InputError
-from detent.export.code import FLAGS, as_json, drawn_text, seconds, texts
+from detent.export.a2l import a2l_text
+from detent.export.code import FLAGS, as_json, drawn_text, parameters, registers, seconds, texts
 from detent.export.drawn import FILES, ROUNDS, Chance, drawn_vectors
 from detent.export.serial import serial_texts
 from detent.export.translate.program import Program
@@ -96,6 +97,8 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
     code = texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)) | serial_texts(axis, unit, axis.name)
     made: dict[str, bytes] = {name: text.encode() for name, text in code.items()}
     chance = Chance(unit, program, golden.params)
+    rows = ([asdict(one) for one in some] for some in (parameters(program, golden.params), registers(unit)))
+    made[f"{unit.name}.a2l"] = a2l_text(unit.name, axis.name, __version__, *rows).encode()
     made[f"{unit.name}_drawn.c"] = drawn_text(chance).encode()
     made["vectors/job.vec"] = golden.vectors()
     made["vectors/params.bin"] = bytes(golden.params)
@@ -133,6 +136,14 @@ def read_manifest(folder: Path) -> dict[str, Any] | None:
     except (OSError, ValueError):
         return None
     return cast("dict[str, Any]", found) if isinstance(found, dict) and "files" in found else None
+
+
+def manifest_of(folder: Path) -> dict[str, Any]:
+    """The manifest of an export; refused where there is none."""
+    found = read_manifest(folder)
+    if found is None:
+        raise InputError.of_file(str(folder), f"a folder without {MANIFEST}", "an export", "detent export firmware")
+    return found
 
 
 def changed_files(folder: Path, manifest: Mapping[str, Any]) -> list[str]:
@@ -191,6 +202,8 @@ Written by detent {manifest["detent"]} from an axis of the method {manifest["met
    `{name}.h` say what for.
 5. `registers.csv` names every register and `params.csv` every parameter. A `{name}_params` in RAM may be exchanged
    between two ticks, by its pointer.
+5. `{name}.a2l` says the same to calibration tools. It takes `{name}_p`, `{name}_c` and `{name}_l` for the variables of
+   parameters, controller and lines; `detent export addresses` on this folder fills in where a linked program has them.
 
 The simulation handles what happened in a tick at its end: equal bits need the same calls in the same order.
 

@@ -4,7 +4,7 @@
 |---|---|
 | HTML, SVG, PNG, PDF, VCD | the program that made it, as these formats name it |
 | HDF5, Parquet | the ``format`` of a trace, among the attributes or the metadata |
-| TOML, C header | the first line, with a checksum of the others: a file that somebody has edited is theirs |
+| TOML, C header, A2L | the first line, with a checksum of the others: a file that somebody has edited is theirs |
 | CSV | its heading: every program that reads numbers would take a comment for a row of them |
 
 A mark is looked for in the bytes. No library opens the file: it may be anybody's.
@@ -129,4 +129,5 @@ _MARKED: dict[str, Callable[[Path], bool]] = {
     ".csv": _has_heading,
     ".toml": _is_signed_file,
     ".h": _is_signed_file,
+    ".a2l": _is_signed_file,
 }

@@ -86,6 +86,7 @@ class Leaf:
     width: Width
     length: int
     by: str = ""
+    range: tuple[float, float] | None = None
 
 
 # Who writes a wire: sensor words and switches come from the plant, actuator words and enables from the controller.
@@ -188,7 +189,7 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
             if field.block is not None:
                 yield from field.block.leaves(path + ".", place, writer)
             elif field.width is not None:
-                yield Leaf(path, field.doc, field.unit, place, field.width, field.length, writer)
+                yield Leaf(path, field.doc, field.unit, place, field.width, field.length, writer, field.range)
 
     def snapshot(self) -> bytes:
         """Copy of the whole state."""

@@ -3,18 +3,20 @@
 import csv
 import json
 import struct
+from types import SimpleNamespace
 
 import pytest
 
 import detent
 from detent.errors import DetentError, InputError
-from detent.export.code import seconds
+from detent.export.code import range_checks, seconds, template
 from detent.export.translate.values import RefusedError
 from detent.export.unit import options_of, outside_ranges, unit_of
 from detent.export.vectors import CALL, CHECK, END, SIGNAL, TICKS, WRITE, Golden, record
 from detent.export.verify import TARGETS, Target, differences, told_of, verify
 from detent.export.write import MANIFEST, export_firmware, read_manifest
 from detent.kernel.image import FNV_BASIS, FNV_PRIME, WHOLE, begin_hash
+from detent.kernel.registers import Registers, f8, i2_array, i8, register, u1
 from detent.methods.cascade.controller import CascadeControllerParams, coast, guard_axis, take_event
 from detent.methods.cascade.host import CascadeHost
 
@@ -48,7 +50,8 @@ def test_the_files_are_those_of_the_manifest(folder):
 
 def test_a_folded_option_is_a_row_of_the_parameters_without_an_expression(folder):
     found = {row["name"]: row for row in rows(folder, "params.csv")}
-    assert found["law.position_pid"]["fixed"]
+    assert found["law.position_pid"]["tunable"] == "an option, folded into the code"
+    assert found["law.period"]["tunable"] == "yes"
     assert found["law.position_pid"]["expression"] == ""
     assert found["law.period"]["expression"] == "p->law.period"
     assert float(found["law.period"]["default"]) == 0.00025
@@ -65,6 +68,33 @@ def test_every_register_has_its_number_and_its_writer(folder, axis):
     assert by["lines.motor.count"] == "plant"
     assert by["lines.command"] == "controller"
     assert by["controller.on"] == ""
+    leaves = [leaf for leaf in unit_of(axis).leaves if leaf.range is not None]
+    assert leaves
+    for leaf in leaves:
+        name = ("controller" if leaf.path[0] == "c" else "lines") + leaf.path[1:]
+        row = next(one for one in found if one["name"] == name)
+        assert row["range"] == f"{leaf.range[0]} to {leaf.range[1]}"
+        assert (row["unit"], row["width"], row["length"]) == (leaf.unit, leaf.width.code, str(leaf.length))
+
+
+class Ranged(Registers):
+    """Parameters of which each has another reason for its check."""
+
+    free: i8 = register("no range")
+    share: f8 = register("both ends", range=(0.5, 1.0))
+    low: u1 = register("its width holds the lower end", range=(0, 9))
+    whole: u1 = register("its width holds both ends", range=(0, 255))
+    table: i2_array = register("of several", length=3, range=(-32768, 5))
+    folded: u1 = register("no part of the structure", range=(0, 1), option=True)
+
+
+def test_a_range_is_checked_where_its_width_does_not_hold_it_anyway():
+    found = range_checks(SimpleNamespace(options={(Ranged, "folded"): 1}), Ranged())
+    assert [(one["number"], one["text"], one["length"]) for one in found] == [
+        (2, "(p->share >= 0.5) && (p->share <= 1.0)", 0), (3, "(p->low <= 9)", 0), (5, "(p->table[k] <= 5)", 3),
+    ]  # fmt: skip
+    text = template("unit.c.in", name="n", code="", floats=False, checks=[{"text": "a[k]", "number": 5, "length": 3}])
+    assert "for (uint32_t k = 0; k < 3; k++) {\n        if (!(a[k])) {\n            return 5;" in text
 
 
 def parsed(data: bytes, leaves, signals=(8, 8, 8, 8), calls=()):
