@@ -14,7 +14,6 @@ from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.cascade_rig import BY_HAND, by_hand
 from tests.identify_files import columns_of, write_log
 from tests.live_browser import run_script
-from tests.standstill_rig import RIGID, both, drawn, example, rigid, told
 from tests.standstill_rig import RIGID, axis, both, drawn, example, rigid, told
 from tests.standstill_truth import AXES, PAGE, WITHIN, compare, each, hunting, truth_of, truths
 from tests.store_rig import QUESTION, fill, fill_killed, run_killed
@@ -434,7 +433,7 @@ def test_feedforward_takes_what_is_known_of_its_constants():
 
 
 def test_28_check_cautions_the_gains_by_hand_and_not_those_of_tune():
-    """Standstill aside; Ms of the example as it was shipped is 2.22 at 344 Hz."""
+    """Ms of the example as it was shipped is 2.22 at 344 Hz."""
     by_hand_too = detent.load(CASCADE, BY_HAND)
     (caution,) = by_hand_too.check().warnings
     assert (caution.name, caution.value) == ("Ms at the command", "2.22 at 344 Hz")
@@ -442,13 +441,39 @@ def test_28_check_cautions_the_gains_by_hand_and_not_those_of_tune():
     found = by_hand_too.tune().values
     stated = CascadeTuning(detent.load(CASCADE).spec).stated
     assert found == stated  # the packaged example has the gains of tune, all three digits
-    loose = [*BY_HAND, "mechanics.coupling.backlash=100 um", "method.feedback.position=load",
-             "load_encoder.resolution=1 um", "method.velocity_integral=0 V/m",
-             *both(coulomb="0 N", static="0 N"), *both("load_friction", coulomb="0 N", static="0 N")]  # fmt: skip
-    gap = "backlash in the position loop"
-    assert gap in {one.name for one in detent.load(CASCADE, loose).check().warnings}
-    held = detent.load(CASCADE, [*loose, *both(coulomb="20 N", static="20 N")])
-    assert gap not in {one.name for one in held.check().warnings}
+
+
+FREE_LOAD = both("load_friction", coulomb="0 N", static="0 N")
+FREE_GAP = ["mechanics.coupling.backlash=100 um", "method.feedback.position=load", "load_encoder.resolution=1 um",
+            "method.velocity_integral=0 V/m", *both(coulomb="0 N", static="0 N"), *FREE_LOAD]  # fmt: skip
+STICKS = both(static="40 N", stribeck="0 m/s")  # over Coulomb friction of 14 and 16 N
+HELD = both("load_friction", coulomb="20 N", static="20 N")
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("overrides", "kind", "swing"),
+    [
+        (FREE_GAP, "gap crossing", near(104e-6, 0.05)),
+        (STICKS, "stick-slip", pytest.approx(17.5e-6, abs=1.5e-6)),
+        ([*FREE_GAP, *both(coulomb="20 N", static="20 N")], "gap crossing", near(104e-6, 0.05)),  # the load is free
+        ([*FREE_GAP, *both(coulomb="20 N", static="20 N"), *HELD], "", 0.0),
+        ([], "", 0.0),
+    ],
+)
+def test_28_check_cautions_what_hunts_at_standstill(overrides, kind, swing):
+    """A gap of 100 um without friction and without an integral goes to and fro by 104 um at 9.3 Hz."""
+    axis = detent.load(CASCADE, [*BY_HAND, *overrides])
+    report = axis.check()
+    row = report.derived[-1]
+    cautions = [one for one in report.warnings if one.name == "standstill"]
+    assert row.name == "standstill"
+    assert [kind in one.value for one in cautions] == [True] * bool(kind)
+    if kind:
+        assert row.text.startswith("hunts from 8 of 8 starts")
+        worst = standstill(axis.spec, 8).kinds[0]
+        assert max(worst.swing("motor"), worst.swing("load")) == swing
+        assert ("is a default" in cautions[0].value) == (overrides is STICKS)  # static friction of the guides
 
 
 # ---- hunting
@@ -962,6 +987,8 @@ def test_39_filtered_servos_fail_where_their_loop_is_unstable_and_friction_does_
     assert beyond.mean() == pytest.approx(unstable, abs=0.03)
     assert fails[beyond].mean() > 0.8
     assert fails[~beyond].mean() < 0.05
+
+
 @pytest.mark.process
 @pytest.mark.parametrize("verb", ["tune", "hunt", "tolerance"])
 def test_40_the_help_of_a_verb_loads_no_more_than_that_of_check(verb):
@@ -995,6 +1022,8 @@ def test_40_reports_open_without_a_network_and_on_a_telephone(verb, tmp_path):
     assert seen["charts"] >= 3
     assert seen["wide"] == 360  # it does not scroll sideways
     assert axis.name in seen["heading"]
+
+
 FREE_EDGE = [*both(coulomb="0 N", static="0 N"), "encoder.resolution=10 um", "method.velocity_integral=0 V/m",
              "drive.command_step=0 V"]  # fmt: skip
 
