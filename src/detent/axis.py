@@ -26,6 +26,7 @@ from detent.record.machine import Progress
 from detent.record.recorder import Recorder, choose_leaves
 from detent.record.trace_files import TraceWriter
 from detent.runs import Run, Timing
+from detent.tune.checked import check_axis
 
 if TYPE_CHECKING:
     from detent.methods.linear import LinearModel
@@ -96,8 +97,8 @@ class Axis(OnScreen):
         return Axis(self.file.replaced({**(changes or {}), **tables}))
 
     def check(self) -> CheckReport:
-        """Effective values, derived figures and warnings."""
-        return check_spec(self.file)
+        """Effective values, derived figures and warnings; of a cascade also what it does at standstill."""
+        return check_axis(self.file)
 
     def check_signals(self, names: Sequence[str]) -> None:
         """Refuse names and patterns that are no register of the axis, before any work is done, and name the nearest."""
@@ -244,7 +245,7 @@ class Axis(OnScreen):
             axis=Kept.of(self.file.file, self.file.source.content),
             overrides=list(self.file.overrides),
             changes=self.file.changes,
-            effective={row.key: shown(row.value) for row in self.check().rows},
+            effective={row.key: shown(row.value) for row in check_spec(self.file).rows},
             job=job,
             seed=self.simulated.seed,
             signals=list(signals),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from detent.errors import DetentError
 from detent.files.screen import Block, OnScreen, Screen
+from detent.methods.check import check_spec
 from detent.methods.method import Result, Shown
 from detent.page.frame import Comparison
 from detent.page.parts import Note
@@ -125,8 +126,8 @@ class Run(OnScreen):
 
     @cached_property
     def cautions(self) -> tuple[str, ...]:
-        """What `Axis.check` warns of: it was known before the run."""
-        return tuple(map(str, self.axis.check().warnings))
+        """What a look at the file warns of, standstill aside: it was known before the run."""
+        return tuple(map(str, check_spec(self.axis.file).warnings))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as ``--json`` prints it."""

@@ -433,7 +433,7 @@ def test_feedforward_takes_what_is_known_of_its_constants():
 
 
 def test_28_check_cautions_the_gains_by_hand_and_not_those_of_tune():
-    """Standstill aside; Ms of the example as it was shipped is 2.22 at 344 Hz."""
+    """Ms of the example as it was shipped is 2.22 at 344 Hz."""
     by_hand_too = detent.load(CASCADE, BY_HAND)
     (caution,) = by_hand_too.check().warnings
     assert (caution.name, caution.value) == ("Ms at the command", "2.22 at 344 Hz")
@@ -441,13 +441,39 @@ def test_28_check_cautions_the_gains_by_hand_and_not_those_of_tune():
     found = by_hand_too.tune().values
     stated = CascadeTuning(detent.load(CASCADE).spec).stated
     assert found == stated  # the packaged example has the gains of tune, all three digits
-    loose = [*BY_HAND, "mechanics.coupling.backlash=100 um", "method.feedback.position=load",
-             "load_encoder.resolution=1 um", "method.velocity_integral=0 V/m",
-             *both(coulomb="0 N", static="0 N"), *both("load_friction", coulomb="0 N", static="0 N")]  # fmt: skip
-    gap = "backlash in the position loop"
-    assert gap in {one.name for one in detent.load(CASCADE, loose).check().warnings}
-    held = detent.load(CASCADE, [*loose, *both(coulomb="20 N", static="20 N")])
-    assert gap not in {one.name for one in held.check().warnings}
+
+
+FREE_LOAD = both("load_friction", coulomb="0 N", static="0 N")
+FREE_GAP = ["mechanics.coupling.backlash=100 um", "method.feedback.position=load", "load_encoder.resolution=1 um",
+            "method.velocity_integral=0 V/m", *both(coulomb="0 N", static="0 N"), *FREE_LOAD]  # fmt: skip
+STICKS = both(static="40 N", stribeck="0 m/s")  # over Coulomb friction of 14 and 16 N
+HELD = both("load_friction", coulomb="20 N", static="20 N")
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("overrides", "kind", "swing"),
+    [
+        (FREE_GAP, "gap crossing", near(104e-6, 0.05)),
+        (STICKS, "stick-slip", pytest.approx(17.5e-6, abs=1.5e-6)),
+        ([*FREE_GAP, *both(coulomb="20 N", static="20 N")], "gap crossing", near(104e-6, 0.05)),  # the load is free
+        ([*FREE_GAP, *both(coulomb="20 N", static="20 N"), *HELD], "", 0.0),
+        ([], "", 0.0),
+    ],
+)
+def test_28_check_cautions_what_hunts_at_standstill(overrides, kind, swing):
+    """A gap of 100 um without friction and without an integral goes to and fro by 104 um at 9.3 Hz."""
+    axis = detent.load(CASCADE, [*BY_HAND, *overrides])
+    report = axis.check()
+    row = report.derived[-1]
+    cautions = [one for one in report.warnings if one.name == "standstill"]
+    assert row.name == "standstill"
+    assert [kind in one.value for one in cautions] == [True] * bool(kind)
+    if kind:
+        assert row.text.startswith("hunts from 8 of 8 starts")
+        worst = standstill(axis.spec, 8).kinds[0]
+        assert max(worst.swing("motor"), worst.swing("load")) == swing
+        assert ("is a default" in cautions[0].value) == (overrides is STICKS)  # static friction of the guides
 
 
 # ---- hunting

@@ -19,6 +19,7 @@ from detent.methods.moves.job import one_move
 from detent.tune import workers
 from detent.tune.batch import run_chunk
 from detent.tune.cases import draw
+from detent.tune.stand import look
 
 CASE_BAR = 1.0e-3  # a case of the cascade, 0.5 s simulated [s]: 100 s for 100,000
 TICK_BAR = 135e-9  # in its loop
@@ -27,6 +28,7 @@ MEMORY_BAR = 500e6  # of 100,000 cases [byte]
 DASK_BAR = 0.030  # a chunk of 1000 cases beyond its computation
 TUNE_BARS = {"": 8.0, SLIDE: 20.0}
 HUNT_BARS = 4.0, 20.0  # median, worst
+CHECK_BAR = 1.0  # of the row of `detent check`
 HELP_BAR = 0.03  # more than that of `detent check`
 SERVO_BAR = 12e-3  # a case of the filtered servo: 120 s for 10,000
 CASES = 1000
@@ -134,6 +136,13 @@ def test_forecasts_of_hunting(benchmark):
     if not benchmark.disabled:
         assert median(costs) <= HUNT_BARS[0], costs
         assert max(costs) <= HUNT_BARS[1], costs
+
+
+def test_the_row_of_check(benchmark):
+    file = detent.load(EXAMPLES / "cascade.toml").file
+    took = held(benchmark, lambda: look(file))
+    if not benchmark.disabled:
+        assert took <= CHECK_BAR
 
 
 def test_help_of_the_verbs(benchmark):

@@ -17,10 +17,10 @@ FIGURE = (
 @app.command()
 def check(file: File, overrides: Set = None, *, as_json: Json = False) -> None:
     """Check an axis file: every effective value and its origin, derived figures, and warnings."""
-    from detent.methods.check import check_spec
     from detent.methods.load import read_axis
+    from detent.tune.checked import check_axis
 
-    report = check_spec(read_axis(file, overrides or []))
+    report = check_axis(read_axis(file, overrides or []))
     if as_json:
         print_json(report.to_dict())
         return

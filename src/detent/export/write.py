@@ -20,6 +20,7 @@ from detent.export.translate.values import RefusedError
 from detent.export.unit import ControlUnit, options_of, outside_ranges, unit_of
 from detent.export.vectors import Golden, record
 from detent.files.text import write_errors
+from detent.methods.check import check_spec
 
 MANIFEST = "manifest.json"
 TICKS = 1_000_000  # of the golden run at most
@@ -118,7 +119,7 @@ def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[st
         "detent": __version__, "name": golden.unit.name, "axis": axis.name, "motor": golden.unit.motor,
         "method": axis.method.name, "job": job,
         "ticks": golden.ticks, "hash": f"{golden.hash.number:016x}", "flags": FLAGS,
-        "values": {row.key: row.value for row in axis.check().rows},
+        "values": {row.key: row.value for row in check_spec(axis.file).rows},
         "options": {f"{one.__name__}.{key}": value for (one, key), value in options_of(golden.params).items()},
         "functions": len(program.order),
         "loops": sorted(f"{where}: {text}" for where, text in program.notes.loops),

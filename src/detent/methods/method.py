@@ -284,6 +284,8 @@ class Method(Protocol[SpecT]):
     `tuning.Search`."""
     stands: ClassVar[str] = ""
     """Place of what watches it at standstill: ``ensemble(spec)`` gives a `tuning.Ensemble`; none where no loop does."""
+    checks_standstill: ClassVar[bool] = False
+    """Whether `check` watches it there as well: eight of its starts then take less than half a second."""
     rests: ClassVar[str] = ""  # what holds it at rest where no loop does, as the end of a sentence
     keeps: ClassVar[str] = ""
     """Place of what its controller keeps where the machine is another than that of its file: ``kept(spec)`` gives

@@ -253,6 +253,16 @@ class Ensemble(Protocol):
         """The specification with another static friction, over Coulomb friction, and Stribeck velocity [m/s]."""
         ...
 
+    @property
+    def as_stated(self) -> Any:
+        """The specification with static friction only where the file states it; None where that changes nothing."""
+        return None
+
+    def helps(self, kind: str) -> str:
+        """What to try against a kind of hunting."""
+        del kind
+        return "choose other values with `detent tune`"
+
     def slips(self, errors: "NDArray[np.float64]") -> "NDArray[np.float64] | None":
         """Error [m] at the standstill behind a slip that begins at each of these; None where it is no map of one."""
         del errors

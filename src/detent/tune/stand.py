@@ -6,14 +6,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from detent.analysis.linear_system import Margins
-from detent.files.findings import Caution
+from detent.files.findings import Caution, Derived
+from detent.kernel.step import config
 from detent.methods.check import check_spec
 from detent.methods.load import AxisFile
 from detent.methods.registry import METHODS
-from detent.tune.standstill import Standstill, standstill
+from detent.tune.standstill import HUNTS, Standstill, standstill
 from detent.units import format_quantity
 
 STARTS = 8  # at standstill, from which it is left to itself
+EDGE = 1.5  # counts that an axis must swing for `check` to warn: across the edge of one any loop may go
+ASSUMED = "static friction or Stribeck velocity is a default"
+COMPILED = not config.DISABLE_JIT
 NONE = "none: it does not settle"
 MEASURES = ("Ms at", "phase margin at", "gain margin at")
 
@@ -46,11 +50,7 @@ class Stand:
     @property
     def at_rest(self) -> str:
         """What it does at standstill, in words; empty where nothing watched it."""
-        if self.stood is None:
-            return ""
-        share = f"{self.stood.outcome} from {round(self.stood.shares[self.stood.outcome] * STARTS)} of {STARTS} starts"
-        swing = f", {format_quantity(self.stood.swing, self.stood.ensemble.unit, 3)}" if self.stood.hunts else ""
-        return share + swing
+        return "" if self.stood is None else at_rest(self.stood)
 
     @property
     def sensitivity(self) -> tuple[float, float]:
@@ -78,3 +78,48 @@ class Stand:
         if METHODS[self.file.spec.axis.method].stands:
             yield "standstill", self.at_rest or NONE
         yield from ((name, text.partition(", from ")[0]) for name, text in self.summary)
+
+
+def at_rest(found: Standstill) -> str:
+    """Its worst outcome, in a few words."""
+    number = len(found.found)
+    share = f"{found.outcome} from {round(found.shares[found.outcome] * number)} of {number} starts"
+    return share + (f", {format_quantity(found.swing, found.ensemble.unit, 3)}" if found.hunts else "")
+
+
+def look(file: AxisFile) -> tuple[Derived, list[Caution]]:
+    """What `check` says of an axis at standstill: a row, and a caution where it hunts."""
+    settles = METHODS[file.spec.axis.method].linear(file.spec).settles
+    if not settles or not COMPILED:
+        why = "steps are not compiled: it would take minutes" if settles else "the loops do not settle"
+        return Derived("standstill", math.nan, "", "not watched", why), []
+    found = standstill(file.spec, STARTS)
+    return _standing(found), list(_hunting(file, found))
+
+
+def _standing(found: Standstill) -> Derived:
+    """The row, beside the rule of thumb."""
+    rule, unit = found.ensemble.rule, found.ensemble.unit
+    told = "simulated; rule of thumb: no stick-slip"
+    if rule is not None and rule.swing > 0.0:
+        period = format_quantity(rule.period, "s", 3)
+        told = f"simulated; rule of thumb: {format_quantity(rule.swing, unit, 3)} every {period}"
+    assumed = "" if found.ensemble.stated else f"; {ASSUMED}"
+    return Derived("standstill", found.swing, unit, at_rest(found), told + assumed)
+
+
+def _hunting(file: AxisFile, found: Standstill) -> Iterator[Caution]:
+    """It hunts, and not only for a static friction that nobody stated: that default is pessimistic."""
+    stated = found.ensemble.as_stated
+    sure = found if stated is None or not found.hunts else standstill(stated, STARTS)
+    if sure.swing <= EDGE * found.ensemble.grain:
+        return
+    from detent.tune.hunted import Hunted  # only where there is something to be told
+
+    worst = found.kinds[0]
+    motion = Hunted(file, found, None, None, None, None, ()).motion(worst)
+    value = f"hunts from {round(found.shares[HUNTS] * STARTS)} of {STARTS} starts: {motion}"
+    if not found.ensemble.stated:
+        value += f" ({ASSUMED})"
+    consequence = "it goes to and fro for ever and is never at rest on its target"
+    yield Caution("standstill", value, "at rest from every start", consequence, found.ensemble.helps(worst.name))

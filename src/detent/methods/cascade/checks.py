@@ -314,17 +314,8 @@ def _bandwidth(m: CascadeFigures) -> Iterator[Caution]:
 
 def _position(m: CascadeFigures) -> Iterator[Caution]:
     """Position is measured where and as finely as it is held, and a count of velocity does not shake the drive."""
-    spec, method, coupling, unit = m.spec, m.spec.method, m.spec.mechanics.coupling, m.spec.unit("m")
+    spec, method, unit = m.spec, m.spec.method, m.spec.unit("m")
     count = spec.encoder_of("position").resolution
-    rubs = any(one.coulomb > 0.0 for one in directions(spec).values())  # without, a proportional loop hunts as well
-    loose = coupling is not None and coupling.backlash > 0 and method.feedback.position == "load"
-    if coupling is not None and loose and (m.integrates or not rubs):
-        limit = "none, if the position loop uses the load encoder, and has an integral or no friction"
-        consequence, remedy = (
-            "at rest the motor hunts across the backlash (limit cycle)",
-            put("method.feedback.position", '"motor"'),
-        )
-        yield Caution("backlash in the position loop", text(coupling.backlash, unit), limit, consequence, remedy)
     if method.in_position < count:
         key, limit = "method.in_position", f"at least a count of the encoder, {text(count, unit)}"
         consequence, remedy = (

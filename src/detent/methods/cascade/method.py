@@ -43,7 +43,7 @@ class CascadeMethod(Method[CascadeSpec]):
     takes, reads = "detent.methods.moves.job:MoveJob", "detent.methods.moves.job:load_moves"
     linear_loops = "loop:linear_loops"
     tunes = "tuning:CascadeTuning"
-    stands = "standstill:CascadeEnsemble"
+    stands, checks_standstill = "standstill:CascadeEnsemble", True
     keeps, batches = "build:kept", "batch:CascadeBatch"
     leaves_out = (
         "Neglected: saturation, quantization, Coulomb and Stribeck friction; both masses move, backlash is closed.",

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.files.nearest import put
 from detent.methods.cascade.build import build_cascade
 from detent.methods.cascade.checks import directions
 from detent.methods.cascade.derive import grain
@@ -37,6 +38,7 @@ STEEP = 0.86  # largest slope of the falling friction, in (Fs - Fc)/vs: of 1 - e
 STANDS = 0.1  # share of the time that friction holds an axis that sticks and slips
 PART = 0.5  # share of the gap that a motor crosses in it
 OFTEN = 0.05  # share of the samples at the limit of an axis that saturates
+MORE_REST = "less static friction, a stiffer position loop, or no integral"  # what helps against stick-slip
 SINGLE = 1.5  # counts that a swing across the edge of a count has at most
 
 
@@ -174,8 +176,7 @@ class CascadeEnsemble(Ensemble):
         if self.damping > STEEP * falls:
             return Rule(0.0, math.inf, "the velocity loop is steeper than the falling friction")
         swing = (static - moving) / self.stiffness
-        why = "less static friction, a stiffer position loop, or no integral"
-        return Rule(swing, 4.0 * (static + moving) / (self.growth * swing), why)
+        return Rule(swing, 4.0 * (static + moving) / (self.growth * swing), MORE_REST)
 
     @property
     def forecasts(self) -> list[Forecast]:
@@ -216,6 +217,28 @@ class CascadeEnsemble(Ensemble):
             if table.coulomb > 0.0:
                 values |= {f"{key}.static": ratio * table.coulomb, f"{key}.stribeck": stribeck}
         return self.spec.varied(values)
+
+    @property
+    def as_stated(self) -> CascadeSpec | None:
+        """The specification without static friction beyond Coulomb friction where that is a default."""
+        assumed = {
+            f"{key}.static": table.coulomb
+            for key, table in directions(self.spec).items()
+            if table.coulomb > 0.0 and "static" not in table.model_fields_set
+        }
+        return self.spec.varied(assumed) if assumed else None
+
+    def helps(self, kind: str) -> str:
+        """The position from the motor, a dead band, or other gains."""
+        if kind == "gap crossing":
+            load = self.spec.mechanics.load_friction  # a load that nothing holds goes to and fro in its gap by itself
+            held = min(load.positive.coulomb, load.negative.coulomb) > 0.0
+            if held and self.spec.method.feedback.position == "load":
+                return put("method.feedback.position", '"motor"')
+            return "less play, or friction at the load"
+        if kind == "stick-slip":
+            return f"{MORE_REST}, or the dead band that `detent hunt --dead-band` finds"
+        return super().helps(kind)
 
     def slips(self, errors: Numbers) -> Numbers | None:
         """Error behind a slip, of an axis without a gap that integrates and sticks."""
