@@ -50,7 +50,7 @@ def lost(motor: Any) -> int:
     from detent.control.step_rule import start_move
     from detent.plant.stepper_rotor import lost_steps
 
-    start_move(motor.controller.rule, 1)
+    start_move(motor.controller.rule, 1, 0)
     motor.advance_to(FOREVER, 0, until_event=True)
     motor.advance_to(motor.r.tick + round(SETTLING / motor.p.plant.rotor.dt), 0, until_event=False)
     return lost_steps(motor.p.plant.rotor, motor.r.plant.rotor)
@@ -67,7 +67,7 @@ def watch(motor: Any, names: Sequence[str], seconds: float, every: int) -> tuple
     picks = np.concatenate([np.arange(leaf.offset, leaf.offset + leaf.width.size) for leaf in leaves]).astype(np.int64)
     count = round(seconds / motor.p.plant.rotor.dt / every)
     rows = np.zeros((count + 1, len(picks)), np.uint8)
-    start_move(motor.controller.rule, 1)
+    start_move(motor.controller.rule, 1, 0)
     left, feed = count * every, motor.feed
     while left > 0:
         left -= advance(motor.p, motor.r, left, rows, picks, every, *feed)
