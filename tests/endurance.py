@@ -85,7 +85,7 @@ CLOCKS = {
         ), 1),
         dict.fromkeys((
             "controller.generator.goal", "controller.generator.command", "controller.deviation.position",
-            "controller.watched",
+            "controller.watched", "controller.mark",
         ), 1),
         "controller.deviation.position", ("controller.lowest", "controller.highest"), quiet=slide,
     ),

@@ -266,7 +266,7 @@ def test_17_a_bit_of_the_random_vectors_flipped_is_found_wherever_it_is(exported
 def test_16_the_vectors_take_nearly_all_ways_through_each(exported, method):
     needs("host-gcc")
     found = reach(exported(method, LONG, MANY))
-    assert found.outcomes > 150
+    assert found.outcomes > 100
     assert found.share >= 95.0, found.missed
 
 
@@ -280,7 +280,22 @@ def test_15_mutants_are_found(exported, method):
     assert len(missed) <= 15, missed
 
 
-BARS_27 = {"cascade": 1700, "filtered_servo": 160, "phase_servo": 170, "rotary_table": 200}  # of memory [byte]
+def size_of(field) -> int:
+    """Bytes of a register or of a block."""
+    return ctypes.sizeof(field.block) if field.block else field.width.size * max(field.length, 1)
+
+
+BARS_27 = {
+    "cascade": 1700,
+    "filtered_servo": 160,
+    "phase_servo": 170,
+    "rotary_table": 200,
+    "zoom": 80,
+    "print_head": 4700,
+}  # of memory [byte]
+DEEPEST_27 = {"print_head": 450}  # bytes of stack; of the others 260
+LATER = {"guard", "supervision", "watched", "look", "marks", "mark", "stop_at"}
+"""What the figures of the specification do not count: protection, homing by an index, a stop to look at on the way."""
 
 
 @pytest.mark.wide
@@ -294,16 +309,15 @@ def test_27_memory_and_stack_on_a_cortex_m4(exported, method):
     assert one.sizes.memory == ctypes.sizeof(unit.controller) + ctypes.sizeof(unit.lines)
     # The figures of the specification are of units without protection and without lines. Of the rotary table it counts
     # the positioner alone: interrupts, task and composition of the angle are the unit's by now, too.
-    blocks = {name: field.block for name, field in unit.controller.__fields__.items() if field.block}
-    protection = sum(ctypes.sizeof(blocks[name]) for name in ("guard", "supervision") if name in blocks)
-    bare = ctypes.sizeof(unit.controller) - protection
-    bare = ctypes.sizeof(blocks["positioner"]) if "positioner" in blocks else bare
+    fields = unit.controller.__fields__
+    later = sum(size_of(fields[name]) for name in LATER & fields.keys())
+    bare = size_of(fields["positioner"]) if "positioner" in fields else ctypes.sizeof(unit.controller) - later
     assert 0.5 * BARS_27[method] <= bare <= BARS_27[method]
     assert one.sizes.written == 0
     stack = one.sizes.stack[f"{manifest['name']}_control"]
     assert stack == max(one.sizes.stack.values())
-    assert 50 <= stack <= 260
-    assert "memcpy" in one.sizes.library
+    assert 50 <= stack <= DEEPEST_27.get(method, 260)
+    assert ("memcpy" in one.sizes.library) == (method != "zoom")
 
 
 def test_22_three_axes_in_one_program_keep_to_themselves(exported, tmp_path):

@@ -40,7 +40,9 @@ class StepRule(Registers):
     heading: i1 = register("direction wanted, written by the host: 1 or -1; a running motor slows down to turn")
     turns: u2 = register("reversals at sentinels that the automatic move still has to make", unit="count")
     manual: u1 = register("1: the operator has taken over")
-    request: i2 = register("ramp index that the operator asks for, -1 when released", unit="count")
+    request: i2 = register(
+        "ramp index that the operator asks for, -1 when released", unit="count", range=(-1, RAMP - 1)
+    )
     request_word: i4 = register("word that the operator asks for", unit="count")
     reset: u1 = register("leave a fault, written by the host, cleared when done")
     event: u1 = register("1 when the motor has come to rest; the host clears it")

@@ -196,7 +196,9 @@ class Chance:
     def call(self, f: Function) -> int:
         """Call a step with arguments that are drawn; the bits of its result."""
         self.told = [self._argument(f.names[name]) for name in f.parameters]  # pyright: ignore[reportArgumentType] - all known
-        result = getattr(import_module(f.py.__module__), f.py.__name__)(*self.told)
+        # A block cannot leave a compiled step; the plain one is the same, and calls compiled ones.
+        step = f.py if f.result_kind == "file" else getattr(import_module(f.py.__module__), f.py.__name__)
+        result = step(*self.told)
         if result is None or isinstance(result, Registers):
             return 0
         if isinstance(result, float):
