@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from tests.docs.pages import blocks_of
 
 import detent
 from detent.errors import InputError
@@ -305,12 +306,20 @@ LATER = {"guard", "supervision", "watched", "look", "marks", "mark", "stop_at"}
 LATER_26 = ("guard", "supervision", "home_marks", "faults", "endurance")
 """The same as files of steps."""
 BARS_26 = {
-    "print_head": (6300, 7300), "filtered_servo": (2000, 2000), "zoom": (1100, 1200), "phase_servo": (1600, 1900),
-    "rotary_table": (2600, 2900), "cascade": (1800, 2200),
+    "print_head": (6300, 7300),
+    "filtered_servo": (2000, 2000),
+    "zoom": (1100, 1200),
+    "phase_servo": (1600, 1900),
+    "rotary_table": (2600, 2900),
+    "cascade": (1800, 2200),
 }  # bytes of flash on M4 and M0
 BARS_28 = {
-    "print_head": (750, 1800), "filtered_servo": (430, 1250), "zoom": (150, 200), "phase_servo": (330, 700),
-    "rotary_table": (2500, 6700), "cascade": (6500, 16000),
+    "print_head": (750, 1800),
+    "filtered_servo": (430, 1250),
+    "zoom": (150, 200),
+    "phase_servo": (330, 700),
+    "rotary_table": (2500, 6700),
+    "cascade": (6500, 16000),
 }  # instructions of the longest call
 CORTEX = ("cortex-m4", "cortex-m0")
 
@@ -486,9 +495,12 @@ def test_34_a_serial_line_alone_carries_the_proof_and_8_kb_suffice(exported, tmp
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     command = [target.emulator, *target.machine.split(), "-nographic", "-monitor", "none", "-serial", "stdio"]
-    with (folder / "vectors/job.vec").open("rb") as vectors, subprocess.Popen(
-        [*command, "-kernel", "unit"], cwd=tmp_path, stdin=vectors, stdout=subprocess.PIPE, text=True
-    ) as emulated:
+    with (
+        (folder / "vectors/job.vec").open("rb") as vectors,
+        subprocess.Popen(
+            [*command, "-kernel", "unit"], cwd=tmp_path, stdin=vectors, stdout=subprocess.PIPE, text=True
+        ) as emulated,
+    ):
         killer = threading.Timer(300.0, emulated.kill)
         killer.start()
         try:
@@ -501,6 +513,7 @@ def test_34_a_serial_line_alone_carries_the_proof_and_8_kb_suffice(exported, tmp
 # ---- sources that go on, parameters that change
 
 
+@pytest.mark.wide
 def test_18_a_step_edited_after_the_export_is_named(tmp_path):
     source = Path(detent.__file__).parent
     shutil.copytree(source, tmp_path / "detent", ignore=shutil.ignore_patterns("__pycache__", "static", "*.mp4"))
@@ -593,3 +606,32 @@ def test_29_export_and_verify_take_no_more_processor_time_than_stated(tmp_path):
     assert taken(export) <= 15.0 * 2  # wall time of the specification, on two cores
     assert taken("verify out --on host-gcc") <= 60.0 * 2
     assert taken("verify out") <= 600.0 * 2
+
+
+# ---- in the documentation
+
+LOOP = Path(__file__).parents[2] / "docs/how-to/cascade-on-a-microcontroller.md"
+
+
+def test_30_a_program_of_60_lines_drives_the_cascade_to_the_bit_of_the_simulation(tmp_path):
+    needs("host-gcc")
+    blocks = blocks_of(LOOP)
+    programs = {name: one.text for one in blocks if (name := one.marks.get("file", "")) in ("axis.c", "host.c")}
+    assert sum(len(text.splitlines()) for text in programs.values()) <= 60
+    axis = detent.load(detent.example("cascade.toml"))
+    export_firmware(axis, tmp_path / "firmware", prefix="slide", ticks=100, files=0, rounds=0)
+    (tmp_path / "cascade.toml").write_text(detent.example("cascade.toml").read_text())
+    for name, text in programs.items():
+        (tmp_path / name).write_text(text)
+    made = run(
+        f"gcc {FLAGS} {WARNINGS} -Wno-missing-prototypes -Werror -O2 -Ifirmware axis.c host.c firmware/slide.c "
+        "firmware/slide_params.c -lm -o host", tmp_path,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    told = run("./host", tmp_path)
+    (simulated,) = [one.text for one in blocks if one.language == "python"]
+    (tmp_path / "simulated.py").write_text(simulated)
+    done = run(f"{sys.executable} simulated.py", tmp_path)
+    assert (told.returncode, done.returncode, done.stderr) == (0, 0, "")
+    assert told.stdout == done.stdout  # 17 digits tell every bit
+    assert float(told.stdout.split()[0]) == pytest.approx(0.06, abs=1e-6)  # in its place

@@ -65,7 +65,9 @@ class ChangeRow(Table, frozen=True):
     """A change of a parameter as a file says it."""
 
     time: Time = required("time since power-on", "1 s", ge=0)
-    name: str = required("parameter of the controller, as params.csv of an export names it", "law.cascade.position_gain")
+    name: str = required("parameter of the controller, as in params.csv of an export", "law.cascade.position_gain")
+        "parameter of the controller, as params.csv of an export names it", "law.cascade.position_gain"
+    )
     value: float = required("its value from then on, in the unit of params.csv", "45.0")
 
 
