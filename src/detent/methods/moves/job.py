@@ -66,8 +66,6 @@ class ChangeRow(Table, frozen=True):
 
     time: Time = required("time since power-on", "1 s", ge=0)
     name: str = required("parameter of the controller, as in params.csv of an export", "law.cascade.position_gain")
-        "parameter of the controller, as params.csv of an export names it", "law.cascade.position_gain"
-    )
     value: float = required("its value from then on, in the unit of params.csv", "45.0")
 
 
