@@ -1,4 +1,4 @@
-"""The drawing of the house: its rooms as the import contract orders them, sized by their lines."""
+"""The drawing of the house: its rooms as the import contract orders them, sized by their lines; and a step in C."""
 
 import math
 import tomllib
@@ -9,6 +9,8 @@ import figures
 from figures import BLUE, GREEN, GREY, ORANGE
 
 import detent
+from detent.export.unit import unit_of
+from detent.methods.cascade.build import build_cascade
 
 PACKAGE = Path(detent.__file__).parent
 ROOT = Path(__file__).resolve().parent.parent
@@ -70,4 +72,33 @@ def house() -> None:
         axes.axis("off")
 
 
-FIGURES = (house,)
+def shown_step() -> tuple[list[str], list[str]]:
+    """A step of the cascade axis and the function in C that an export makes of it, signature and names as they are."""
+    axis = detent.load(detent.example("cascade.toml"))
+    unit = unit_of(axis, "slide")
+    program = unit.translated(build_cascade(axis.spec).controller)
+    (found,) = (f for f in program.order if f.py.__name__ == "limit_command")
+    head, brace, body = program.texts[found.py].partition("\n{\n")
+    signature = head.splitlines()[-1].replace(", double rest", ",\n        double rest")
+    text = "\n".join([*head.splitlines()[:-1], signature]) + brace + body
+    python = ["@step", *found.source.splitlines()[found.tree.lineno - 1 :]]
+    return python, text.replace(" *\n", "").splitlines()
+
+
+def firmware() -> None:
+    """A step above the function in C that is made of it."""
+    python, c = shown_step()
+    with figures.picture("firmware.png", 1, 0.19 * (len(python) + len(c)) + 0.5) as (axes,):
+        y = 0.0
+        for lines, colour in ((python, BLUE), (c, ORANGE)):
+            axes.barh(y + 0.5 - len(lines) / 2, 0.006, left=-0.012, height=len(lines), color=colour)
+            for line in lines:
+                y -= 1.0
+                axes.text(0.0, y + 0.5, line, family="monospace", fontsize=8.8, va="center", parse_math=False)
+            y -= 1.0
+        axes.set_xlim(-0.02, 1.0)
+        axes.set_ylim(y + 0.5, 0.5)
+        axes.axis("off")
+
+
+FIGURES = (house, firmware)

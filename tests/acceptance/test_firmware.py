@@ -4,17 +4,24 @@ import csv
 import ctypes
 import json
 import os
+import re
+import resource
 import shutil
 import subprocess
 import sys
+import threading
 from functools import cache
 from pathlib import Path
 
 import pytest
+from tests.docs.pages import blocks_of
 
 import detent
-from detent.export.code import FLAGS, WARNINGS
+from detent.errors import InputError
+from detent.export.code import FLAGS, WARNINGS, template
 from detent.export.linked import fill_addresses
+from detent.export.measure import Measured, measure
+from detent.export.show import shown
 from detent.export.teeth import mutants, reach
 from detent.export.unit import unit_named
 from detent.export.verify import TARGETS, verify
@@ -297,31 +304,89 @@ DEEPEST_27 = {"print_head": 450}  # bytes of stack; of the others 260
 DIVIDES = {"zoom": (), "print_head": ("__aeabi_ldivmod",)}  # routines of the library that these two need
 LATER = {"guard", "supervision", "watched", "look", "marks", "mark", "stop_at"}
 """What the figures of the specification do not count: protection, homing by an index, a stop to look at on the way."""
+LATER_26 = ("guard", "supervision", "home_marks", "faults", "endurance")
+"""The same as files of steps."""
+BARS_26 = {
+    "print_head": (6300, 7300),
+    "filtered_servo": (2000, 2000),
+    "zoom": (1100, 1200),
+    "phase_servo": (1600, 1900),
+    "rotary_table": (2600, 2900),
+    "cascade": (1800, 2200),
+}  # bytes of flash on M4 and M0
+BARS_28 = {
+    "print_head": (750, 1800),
+    "filtered_servo": (430, 1250),
+    "zoom": (150, 200),
+    "phase_servo": (330, 700),
+    "rotary_table": (2500, 6700),
+    "cascade": (6500, 16000),
+}  # instructions of the longest call
+CORTEX = ("cortex-m4", "cortex-m0")
+
+
+@pytest.fixture(scope="session")
+def counted(exported):
+    """What a unit takes, by processor; each is measured once."""
+
+    @cache
+    def make(method: str, ticks: int = SHORT) -> tuple[Path, dict[str, Measured]]:
+        needs(*CORTEX)
+        folder = exported(method, ticks)
+        return folder, {one.target: one for one in measure(folder, CORTEX, 72e6)}
+
+    return make
+
+
+def test_28_35_what_a_call_of_the_cascade_takes_and_its_self_test(counted):
+    folder, found = counted("cascade")
+    name = read_manifest(folder)["name"]
+    for target, bar in zip(CORTEX, BARS_28["cascade"], strict=True):
+        assert found[target].missed == ""
+        entries = {one.name: one for one in found[target].entries}
+        control, tested = entries[f"{name}_control"], entries[f"{name}_selftest"]
+        assert control.calls == SHORT
+        assert 0.2 * bar < control.most <= bar
+        assert 0.1 * control.most < control.mean < control.most
+        assert 1 <= control.tick <= SHORT
+        assert 300 < tested.most <= 96_000  # 35: its result, 0, is that of the replay, which would not be equal else
+        assert found[target].share["most"] == pytest.approx(control.most * 1.5 / (72e6 * read_manifest(folder)["tick"]))
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("method", list(JOBS)[1:])
+def test_28_what_the_longest_call_of_each_takes(counted, method):
+    folder, found = counted(method, LONG)
+    for target, bar in zip(CORTEX, BARS_28[method], strict=True):
+        entries = {one.name: one for one in found[target].entries}
+        assert 0.1 * bar < entries[f"{read_manifest(folder)['name']}_control"].most <= bar
 
 
 @pytest.mark.wide
 @pytest.mark.parametrize("method", JOBS)
-def test_27_memory_and_stack_on_a_cortex_m4(exported, method):
-    needs("cortex-m4")
-    folder = exported(method)
-    (one,) = verify(folder, ["cortex-m4"])
+def test_27_memory_and_stack_on_cortex(counted, method):
+    folder, found = counted(method)
     manifest = read_manifest(folder)
     unit = unit_named(manifest["method"], manifest["name"])
-    assert one.sizes.memory == ctypes.sizeof(unit.controller) + ctypes.sizeof(unit.lines)
     # The figures of the specification are of units without protection and without lines. Of the rotary table it counts
     # the positioner alone: interrupts, task and composition of the angle are the unit's by now, too.
     fields = unit.controller.__fields__
     later = sum(size_of(fields[name]) for name in LATER & fields.keys())
     bare = size_of(fields["positioner"]) if "positioner" in fields else ctypes.sizeof(unit.controller) - later
     assert 0.5 * BARS_27[method] <= bare <= BARS_27[method]
-    assert one.sizes.written == 0
-    stack = one.sizes.stack[f"{manifest['name']}_control"]
-    assert stack == max(one.sizes.stack.values())
-    assert 50 <= stack <= DEEPEST_27.get(method, 260)
+    for one in found.values():
+        sizes = one.sizes["-Os"]
+        assert sizes.memory == ctypes.sizeof(unit.controller) + ctypes.sizeof(unit.lines)
+        assert sizes.written == 0
+        for entry in one.entries:
+            assert entry.painted <= entry.stack, entry
+    control = next(e for e in found["cortex-m4"].entries if e.name == f"{manifest['name']}_control")
+    assert 40 <= control.painted <= DEEPEST_27.get(method, 260)
+    library = found["cortex-m4"].sizes["-Os"].library
     if method in DIVIDES:
-        assert one.sizes.library == DIVIDES[method]
+        assert library == DIVIDES[method]
     else:
-        assert "memcpy" in one.sizes.library
+        assert "memcpy" in library
 
 
 def test_22_three_axes_in_one_program_keep_to_themselves(exported, tmp_path):
@@ -416,3 +481,162 @@ def test_32_addresses_are_those_of_nm(exported, tmp_path, method, compiler):
     for symbol, one in written.items():
         at = one["Address"] if "Address" in one else one["ECU_ADDRESS"]["Address"]
         assert int(at["Value"]) == wanted[symbol]
+
+
+# ---- over a serial line
+
+
+@pytest.mark.parametrize("method", ["phase_servo", "rotary_table"])
+def test_34_a_serial_line_alone_carries_the_proof_and_8_kb_suffice(exported, tmp_path, method):
+    needs("cortex-m4")
+    folder = exported(method)
+    manifest, target = read_manifest(folder), TARGETS["cortex-m4"]
+    name, unit = manifest["name"], unit_named(manifest["method"], manifest["name"])
+    beside = ctypes.sizeof(unit.controller) + ctypes.sizeof(unit.lines) + 8192
+    (tmp_path / "board.ld").write_text(template("board.ld.in", **(target.memory | {"data_length": str(beside)})))
+    made = run(
+        f"{target.compiler} {FLAGS} {target.flags} -Os -DON_UART -T board.ld -Wl,-e,Start -I{folder}", tmp_path,
+        *(str(folder / one) for one in sources(name)), "-o", "unit", *target.libraries.split(),
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    command = [target.emulator, *target.machine.split(), "-nographic", "-monitor", "none", "-serial", "stdio"]
+    with (
+        (folder / "vectors/job.vec").open("rb") as vectors,
+        subprocess.Popen(
+            [*command, "-kernel", "unit"], cwd=tmp_path, stdin=vectors, stdout=subprocess.PIPE, text=True
+        ) as emulated,
+    ):
+        killer = threading.Timer(300.0, emulated.kill)
+        killer.start()
+        try:
+            assert emulated.stdout.readline().split() == ["equal", str(manifest["ticks"]), manifest["hash"]]
+        finally:
+            killer.cancel()
+            emulated.kill()
+
+
+# ---- sources that go on, parameters that change
+
+
+@pytest.mark.wide
+def test_18_a_step_edited_after_the_export_is_named(tmp_path):
+    source = Path(detent.__file__).parent
+    shutil.copytree(source, tmp_path / "detent", ignore=shutil.ignore_patterns("__pycache__", "static", "*.mp4"))
+    axis = detent.load(detent.example("cascade.toml"))
+    folder = export_firmware(axis, tmp_path / "out", ticks=200, files=2, rounds=100).folder
+    command = f"{sys.executable} -m detent verify out --on host-gcc --json --against"
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}
+
+    def verified() -> tuple[int, list[str]]:
+        done = subprocess.run(
+            [*command.split(), str(detent.example("cascade.toml"))], cwd=tmp_path, env=environment,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        found = json.loads(done.stdout)
+        assert "differences" in found, found
+        return done.returncode, found["differences"]
+
+    needs("host-gcc")
+    assert verified() == (0, [])
+    law = tmp_path / "detent/control/cascade_law.py"
+    text = law.read_text()
+    law.write_text(text.replace("    r.integral += increment\n", "    r.integral += increment * 1.0\n", 1))
+    assert law.read_text() != text
+    status, told = verified()
+    assert status == 1
+    assert told[0] == "detent/control/cascade_law.py limit_command is another step than at the export"
+    assert read_manifest(folder)["report"] == {}
+
+
+def test_31_a_set_exchanged_at_tick_10000_is_simulated_and_replayed_equal(tmp_path):
+    needs("host-gcc")
+    axis = detent.load(detent.example("cascade.toml"))
+    rows_of = '[[move]]\nby = "20 mm"\ndwell = "{dwell}"\n'
+    change = '[[parameter_change]]\ntime = "{time!r} s"\nname = "{name}"\nvalue = {value}\n'
+    (tmp_path / "same.toml").write_text(rows_of.format(dwell="2 s"))
+    at = 10_000 * axis.simulated.tick
+    changed = change.format(time=at, name="law.cascade.position_gain", value=41.0)
+    changed += change.format(time=at, name="motor_sensor.delay", value=2)
+    (tmp_path / "changed.toml").write_text(changed + rows_of.format(dwell="2 s"))
+    made = {
+        name: export_firmware(
+            axis, tmp_path / name, job=tmp_path / f"{name}.toml", ticks=12_000, files=0, rounds=0, fixed=["limits.*"]
+        ).folder
+        for name in ("same", "changed")
+    }
+    assert read_manifest(made["same"])["hash"] != read_manifest(made["changed"])["hash"]
+    told = list(shown(made["changed"] / "vectors/job.vec"))
+    (k,) = (k for k, line in enumerate(told) if line.startswith("parameters exchanged"))
+    assert told[k].endswith(": law.cascade.position_gain = 41.0, motor_sensor.delay = 2") or told[k].endswith(
+        ": motor_sensor.delay = 2, law.cascade.position_gain = 41.0"
+    )
+    assert [line for line in told[:k] if line.startswith("tick ")][-1].endswith(" 10000")
+    proven(made["changed"], "host-gcc")
+    fixed = [row for row in rows(made["changed"] / "params.csv") if row["name"].startswith("limits.")]
+    assert {row["tunable"] for row in fixed} == {
+        "by --fixed, folded into the code", "an option, folded into the code",
+    }  # fmt: skip
+    assert {row["expression"] for row in fixed} == {""}
+    assert "following_error" not in (made["changed"] / f"{read_manifest(made['changed'])['name']}.h").read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [("motor_sensor.delay", "64", "motor_sensor.delay = 64; expected: a whole number of i8 from 0 to 63"),
+     ("law.position_pid", "1", "law.position_pid, an option; expected: a tunable number"),
+     ("law.gain", "1", "law.gain, which is none; expected: a tunable number")],
+)  # fmt: skip
+def test_31_a_change_that_does_not_fit_is_refused_with_its_line(tmp_path, name, value, told):
+    job = tmp_path / "job.toml"
+    job.write_text(f'[[parameter_change]]\ntime = "1 s"\nname = "{name}"\nvalue = {value}\n\n[[move]]\nby = "1 mm"\n')
+    with pytest.raises(InputError, match=rf"job\.toml:1:1 .*got {re.escape(told)}"):
+        detent.load(detent.example("cascade.toml")).run(job)
+
+
+@pytest.mark.long
+def test_29_export_and_verify_take_no_more_processor_time_than_stated(tmp_path):
+    def taken(command: str) -> float:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        done = run(f"{sys.executable} -m detent {command}", tmp_path)
+        assert done.returncode == 0, done.stderr[-500:]
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    needs("host-gcc")
+    export = (
+        f"export firmware {detent.example('print_head.toml')} --job {detent.example('letter.txt')} --output out "
+        "--ticks 10000000 --files 20 --rounds 2000"
+    )
+    taken(export)  # compiled steps to the cache
+    assert taken(export) <= 15.0 * 2  # wall time of the specification, on two cores
+    assert taken("verify out --on host-gcc") <= 60.0 * 2
+    assert taken("verify out") <= 600.0 * 2
+
+
+# ---- in the documentation
+
+LOOP = Path(__file__).parents[2] / "docs/how-to/cascade-on-a-microcontroller.md"
+
+
+def test_30_a_program_of_60_lines_drives_the_cascade_to_the_bit_of_the_simulation(tmp_path):
+    needs("host-gcc")
+    blocks = blocks_of(LOOP)
+    programs = {name: one.text for one in blocks if (name := one.marks.get("file", "")) in ("axis.c", "host.c")}
+    assert sum(len(text.splitlines()) for text in programs.values()) <= 60
+    axis = detent.load(detent.example("cascade.toml"))
+    export_firmware(axis, tmp_path / "firmware", prefix="slide", ticks=100, files=0, rounds=0)
+    (tmp_path / "cascade.toml").write_text(detent.example("cascade.toml").read_text())
+    for name, text in programs.items():
+        (tmp_path / name).write_text(text)
+    made = run(
+        f"gcc {FLAGS} {WARNINGS} -Wno-missing-prototypes -Werror -O2 -Ifirmware axis.c host.c firmware/slide.c "
+        "firmware/slide_params.c -lm -o host", tmp_path,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    told = run("./host", tmp_path)
+    (simulated,) = [one.text for one in blocks if one.language == "python"]
+    (tmp_path / "simulated.py").write_text(simulated)
+    done = run(f"{sys.executable} simulated.py", tmp_path)
+    assert (told.returncode, done.returncode, done.stderr) == (0, 0, "")
+    assert told.stdout == done.stdout  # 17 digits tell every bit
+    assert float(told.stdout.split()[0]) == pytest.approx(0.06, abs=1e-6)  # in its place

@@ -13,6 +13,8 @@ from tests.docs.runner import PageRunner, commands_of
 
 # Shown as they are; everything else must be run, parsed or be a directive.
 SHOWN_ONLY = {"text", "csv"}
+# Programs: saved by their mark, and compiled by a command of the page.
+SAVED = {"c"}
 CHECKED = {"console", "python", "output", "toml", "json"}
 # Directives that would show code without its being run: use a plain fence.
 CODE_DIRECTIVES = {
@@ -54,9 +56,11 @@ def test_no_block_escapes_the_check(block):
     if directive:
         assert directive.group() not in CODE_DIRECTIVES, f"{block.where}: use a plain ``` fence, so that it is run"
         return
-    assert block.language in CHECKED | SHOWN_ONLY, (
-        f"{block.where}: `{block.language}` is not among {sorted(CHECKED | SHOWN_ONLY)}; commands are `console` blocks"
+    known = CHECKED | SHOWN_ONLY | SAVED
+    assert block.language in known, (
+        f"{block.where}: `{block.language}` is not among {sorted(known)}; commands are `console` blocks"
     )
+    assert block.language not in SAVED or "file" in block.marks, f"{block.where}: write `<!-- file: NAME -->`"
     assert set(block.marks) <= MARKS, f"{block.where}: unknown mark; known are {sorted(MARKS)}"
     if block.language in SHOWN_ONLY:
         assert not re.search(r"^\$ ", block.text, flags=re.MULTILINE), f"{block.where}: a command in a block not run"

@@ -1,6 +1,6 @@
 """`detent export` and `detent verify`: an axis as firmware, and the proof that it is the one that was simulated."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,6 +8,7 @@ import typer
 
 from detent.cli.app import NOT_DONE, File, Force, Job, Json, Set, Verbs, app, option
 from detent.cli.terminal import print_json, progress_bar, say, split_names, tell
+from detent.errors import DetentError
 
 OUTPUT = "Folder for the export: a new one, an empty one, or that of an earlier export."
 MOTOR = "Which motor, of a file that has several."
@@ -15,12 +16,17 @@ PREFIX = "Prefix of all names in C. Default: from the name of the motor or the a
 TICKS = "Ticks of the golden run at most."
 FILES = "Random register files that each function is called on."
 ROUNDS = "Ticks in which the host does anything and the lines show anything."
+TUNABLE = "Options that stay parameters, comma-separated, * for any text. Default: options become constants."
+FIXED = "Parameters that become constants of the code, comma-separated, * for any text."
+CLOCK = "Clock of a processor, for the share of a tick that the controller takes: 72MHz."
+PRINT = "Show a file of vectors as text: vectors/job.vec, vectors/drawn.vec. Nothing is compiled."
 ON = (
     "Where to replay, comma-separated: host-gcc, host-clang, cortex-m0, cortex-m4, cortex-m7, rv32. Default: all there."
 )
 MUTANTS = "Change one thing of the C at so many places, one at a time, and tell which changes no vector finds."
 BAR = "Tell what the vectors do not reach; fail where they take fewer of the branch outcomes [%]."
-Folder = Annotated[Path, typer.Argument(help="What `detent export firmware` wrote.", show_default=False)]
+EXPORTED = "What `detent export firmware` wrote."
+Folder = Annotated[Path, typer.Argument(help=EXPORTED, show_default=False)]
 AGAINST = "Axis file: make the export anew, with --job as then, and compare."
 
 
@@ -42,6 +48,8 @@ def firmware(
     ticks: Annotated[int, option("--ticks", "NUMBER", TICKS)] = 1_000_000,
     files: Annotated[int, option("--files", "NUMBER", FILES)] = 1000,
     rounds: Annotated[int, option("--rounds", "NUMBER", ROUNDS)] = 1_000_000,
+    tunable: Annotated[list[str] | None, option("--tunable", "PATTERNS", TUNABLE)] = None,
+    fixed: Annotated[list[str] | None, option("--fixed", "PATTERNS", FIXED)] = None,
     overrides: Set = None,
     *,
     as_json: Json = False,
@@ -57,8 +65,9 @@ def firmware(
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "simulating the job, translating the controller")
         made = export_firmware(
-            axis, output, job=job, motor=motor, prefix=prefix, ticks=ticks, files=files, rounds=rounds
-        )
+            axis, output, job=job, motor=motor, prefix=prefix, ticks=ticks, files=files, rounds=rounds,
+            tunable=split_names(tunable), fixed=split_names(fixed),
+        )  # fmt: skip
     found: dict[str, Any] = dict(made.manifest)
     if as_json:
         print_json(found | {"folder": str(made.folder)})
@@ -67,8 +76,13 @@ def firmware(
     say(f"{axis.name}: {found['functions']} functions in {made.folder / made.name}.c", "bold green")
     tell(f"golden run: {found['job']}, {found['ticks']} ticks, hash {found['hash']}")
     tell(f"random vectors: {files} register files for each function, {rounds} ticks of misuse")
-    tell(f"options folded: {', '.join(f'{key} = {value}' for key, value in found['options'].items()) or 'none'}")
-    tell(f"not proven: {', '.join(f'{len(rows)} {what}' for what, rows in unproven.items())}; see manifest.json")
+    for what in ("options", "fixed"):
+        told = ", ".join(f"{key} = {value}" for key, value in found[what].items()) or "none"
+        tell(f"{'options folded' if what == 'options' else 'parameters fixed'}: {told}")
+    for what, rows in unproven.items():
+        grown = len(rows) > made.unproven.get(what, len(rows))
+        before = f", {made.unproven[what]} before: more than in the earlier export" if grown else ""
+        tell(f"not proven: {len(rows)} {what}{before}; see manifest.json")
     tell(f"next: detent verify {made.folder}")
 
 
@@ -98,11 +112,13 @@ def addresses(
 
 @app.command()
 def verify(
-    folder: Folder,
+    folder: Annotated[Path | None, typer.Argument(help=EXPORTED, show_default=False)] = None,
     on: Annotated[list[str] | None, option("--on", "NAMES", ON)] = None,
     against: Annotated[Path | None, option("--against", "FILE", AGAINST)] = None,
     mutants: Annotated[int, option("--mutants", "NUMBER", MUTANTS)] = 0,
     coverage_bar: Annotated[float | None, option("--coverage-bar", "PERCENT", BAR)] = None,
+    clock: Annotated[str, option("--clock", "FREQUENCY", CLOCK)] = "",
+    printed: Annotated[Path | None, option("--print", "FILE", PRINT)] = None,
     job: Job = None,
     overrides: Set = None,
     *,
@@ -113,51 +129,92 @@ def verify(
     Exit status: 0 all equal, 1 something differs, a bar is missed or a tool is not installed, 2 wrong input.
     """
     from detent.axis import load
+    from detent.export import measure as measuring
     from detent.export import teeth
     from detent.export import verify as proving
+    from detent.export.show import shown
 
+    if printed is not None:
+        for line in shown(printed):
+            tell(line)
+        return
+    if folder is None:
+        raise DetentError("got no FOLDER; expected: an export; try: detent verify firmware, or --print FILE")
+    chosen, frequency = split_names(on), measuring.clock_of(clock)
     with progress_bar(quiet=as_json) as progress:
         axis = load(against, overrides or []) if against is not None else None
         other = list(proving.differences(folder, axis, job)) if axis is not None else []
-        proofs = proving.verify(folder, split_names(on), progress)
-        reach = teeth.reach(folder) if coverage_bar is not None else None
-        changed = teeth.mutants(folder, mutants, progress) if mutants else []
-    left_out = {} if on else {one.name: one.missing for one in proving.TARGETS.values() if one.missing}
-    done = bool(proofs) and all(one.equal for one in proofs) and not other
-    done = done and (reach is None or reach.share >= (coverage_bar or 0.0))
+        found = _Found(
+            proving.verify(folder, chosen, progress), other,
+            measuring.measure(folder, chosen, frequency, progress),
+            teeth.reach(folder) if coverage_bar is not None else None, coverage_bar or 0.0,
+            teeth.mutants(folder, mutants, progress) if mutants else [],
+            {} if on else {one.name: one.missing for one in proving.TARGETS.values() if one.missing},
+        )  # fmt: skip
+    measuring.note(folder, **found.kept(), clock=clock)
     if as_json:
-        print_json({
-            "equal": done, "proofs": [asdict(p) for p in proofs], "differences": other, "not run": left_out,
-            "reach": asdict(reach) | {"share": reach.share} if reach else None, "mutants": [asdict(m) for m in changed],
-        })  # fmt: skip
+        print_json(found.plain())
     else:
-        if reach is not None:
-            say(
-                f"branch outcomes taken: {reach.share:.1f} % of {reach.outcomes}",
-                wrong=reach.share < (coverage_bar or 0.0),
-            )
-            for one in reach.missed:
-                tell(f"  line {one.line}, way {one.way} never taken: {one.text}")
-        if changed:
-            tell(f"mutants found: {sum(bool(one.found) for one in changed)} of {len(changed)}")
-            for one in changed:
-                if not one.found:
-                    tell(f"  line {one.line}, {one.becomes} not found: {one.text}")
-        for one in proofs:
-            size = _sizes(one.sizes) if one.equal and one.level == "-Os" else ""
-            said = f"equal, hash {one.told}{size}" if one.equal else one.told
-            say(f"{one.target:<11} {one.level.split()[0] if one.level else '':<4} {said}", wrong=not one.equal)
-        for text in other:
-            say(text, wrong=True)
-        for name, tools in left_out.items():
-            tell(f"{name:<11} not run: needs {tools}")
-        if not proofs:
-            say("nothing was run: no compiler is installed", wrong=True)
-    if not done:
+        for line in measuring.report_lines(folder, found.measured, clock):
+            tell(line)
+        found.tell()
+    if not found.done:
         raise typer.Exit(NOT_DONE)
 
 
-def _sizes(one: Any) -> str:
-    """What a build takes."""
-    stack = f", {max(one.stack.values())} of stack" if one.stack else ""
-    return f", {one.flash} bytes of flash, {one.parameters} of parameters, {one.memory} of memory{stack}"
+@dataclass(frozen=True)
+class _Found:
+    """What a verification found."""
+
+    proofs: list[Any]
+    differences: list[str]
+    measured: list[Any]
+    reach: Any
+    bar: float  # of branch outcomes [%]
+    mutants: list[Any]
+    left_out: dict[str, str]
+
+    @property
+    def done(self) -> bool:
+        """True where all was run and equal, and no bar is missed."""
+        equal = bool(self.proofs) and all(one.equal for one in self.proofs) and not self.differences
+        return equal and (self.reach is None or self.reach.share >= self.bar)
+
+    @property
+    def reached(self) -> dict[str, Any] | None:
+        """The reach as plain data."""
+        return asdict(self.reach) | {"share": self.reach.share} if self.reach else None
+
+    def kept(self) -> dict[str, Any]:
+        """What the manifest keeps."""
+        from detent.export.measure import plain
+
+        hits = {"found": sum(bool(one.found) for one in self.mutants), "of": len(self.mutants)}
+        return {"measured": plain(self.measured), "coverage": self.reached, "mutants": hits if self.mutants else None}
+
+    def plain(self) -> dict[str, Any]:
+        """All of it as plain data."""
+        rows = {"equal": self.done, "proofs": [asdict(p) for p in self.proofs], "differences": self.differences}
+        rows |= {"not run": self.left_out, "reach": self.reached, "mutants": [asdict(m) for m in self.mutants]}
+        return rows | {"measured": self.kept()["measured"]}
+
+    def tell(self) -> None:
+        """Say it, the verdict last."""
+        if self.reach is not None:
+            share = self.reach.share
+            say(f"branch outcomes taken: {share:.1f} % of {self.reach.outcomes}", wrong=share < self.bar)
+            for one in self.reach.missed:
+                tell(f"  line {one.line}, way {one.way} never taken: {one.text}")
+        if self.mutants:
+            tell(f"mutants found: {sum(bool(one.found) for one in self.mutants)} of {len(self.mutants)}")
+            for one in (one for one in self.mutants if not one.found):
+                tell(f"  line {one.line}, {one.becomes} not found: {one.text}")
+        for one in self.proofs:
+            said = f"equal, hash {one.told}" if one.equal else one.told
+            say(f"{one.target:<11} {one.level.split()[0] if one.level else '':<4} {said}", wrong=not one.equal)
+        for text in self.differences:
+            say(text, wrong=True)
+        for name, tools in self.left_out.items():
+            tell(f"{name:<11} not run: needs {tools}")
+        if not self.proofs:
+            say("nothing was run: no compiler is installed", wrong=True)

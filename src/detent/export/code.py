@@ -16,7 +16,7 @@ from detent import __version__
 from detent.export.drawn import FAR, PLACES, SEED, Chance, Row, drawn_from
 from detent.export.translate.program import Function, Program
 from detent.export.translate.text import code_text, comment_of, signals_text, struct_texts
-from detent.export.translate.values import c_field, interval_of, number, type_of_local
+from detent.export.translate.values import Value, c_field, interval_of, number, type_of_local
 from detent.export.unit import LARGE, ControlUnit, members
 from detent.export.vectors import Golden
 from detent.kernel.registers import Field, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
@@ -95,13 +95,13 @@ class Parameter:
 def parameters(program: Program, params: Registers) -> Iterator[Parameter]:
     """Every parameter, in the order of declaration."""
     for count, (prefix, registers, field, width) in enumerate(_fields(params, "")):
-        folded = (type(registers), field.name) in program.options
+        folded, word = (type(registers), field.name) in program.options, "an option" if field.option else "by --fixed"
         value = getattr(registers, field.name)
         default = f"{len(value)} values" if field.length else repr(value)
         yield Parameter(
             count, prefix + field.name, "" if folded else place_of(f"p.{prefix}{field.name}", parameters="p->"),
             width.code, field.length, field.unit, range_text(field.range), default,
-            "an option, folded into the code" if folded else "yes", field.doc,
+            f"{word}, folded into the code" if folded else "yes", field.doc,
         )  # fmt: skip
 
 
@@ -216,14 +216,12 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
         code = "#include <string.h>\n" + code
     signals = [
         {"code": value.width.code, "ctype": value.width.c_name, "bytes": value.width.size, "most": golden.signals[k][0]}
-        for k, value in enumerate(
-            one for one in program.steps[_tick_of(unit)].names.values() if one and one.kind == "signal" and one.width
-        )
+        for k, value in enumerate(signals_of(unit, program))
         if value.width is not None
     ]
     numbers = {width.code: width for width in (get_args(one)[1] for one in (u1, u2, u4, i1, i2, i4, i8, f8))}
     calls = [
-        {"name": one, "takes": taken, "texts": list(_arguments(name, taken))}
+        {"name": one, "takes": taken, "texts": list(_arguments(taken))}
         for one, codes in unit.calls.items()
         for taken in [[numbers.get(code, code) for code in codes]]
     ]
@@ -241,6 +239,12 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
     text = template("params.c.in", name=name, initialiser=initialiser)
     made[f"{name}_params.c"] = f"#include <math.h>\n{text}" if "INFINITY" in initialiser else text
     replay = given | {
+        "exchanged": [
+            {"number": row.number, "length": row.length, "float": width.is_float, "ctype": width.c_name,
+             "place": row.expression + ("[k]" if row.length else "")}
+            for row, (_, _, _, width) in zip(parameters(program, params), _fields(params, ""), strict=True)
+            if row.number in golden.changed
+        ],
         "signals": signals, "leaves": leaves, "calls": calls,
         "call_floats": any("f8" in codes for codes in unit.calls.values()),
         "most_numbers": max(1, *(sum(not isinstance(code, str) for code in one["takes"]) for one in calls)),
@@ -254,7 +258,7 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
     return made
 
 
-def _arguments(name: str, taken: Iterable[str | Width]) -> Iterator[str]:
+def _arguments(taken: Iterable[str | Width]) -> Iterator[str]:
     """Arguments of a call in the replay: registers, what is laid ready, and numbers as they came."""
     numbers = signals = 0
     for one in taken:
@@ -265,7 +269,7 @@ def _arguments(name: str, taken: Iterable[str | Width]) -> Iterator[str]:
             yield f"laid{signals}_"
             signals += 1
         else:
-            yield {"params": f"&{name}_defaults", "controller": "&c_", "lines": "&l_"}[one]
+            yield {"params": "p_", "controller": "&c_", "lines": "&l_"}[one]
 
 
 # ---- random vectors
@@ -340,9 +344,11 @@ def drawn_text(chance: Chance) -> str:
     )  # fmt: skip
 
 
-def _tick_of(unit: ControlUnit) -> Any:
-    tick = next(iter(unit.entries.values()))
-    return getattr(tick, "py_func", tick)
+def signals_of(unit: ControlUnit, program: Program) -> list[Value]:
+    """What a host lays ready for the tick."""
+    tick: Any = next(iter(unit.entries.values()))
+    names = program.steps[getattr(tick, "py_func", tick)].names
+    return [one for one in names.values() if one and one.kind == "signal" and one.width]
 
 
 def _prototype(program: Program, f: Any) -> str:

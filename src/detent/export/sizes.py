@@ -1,51 +1,139 @@
-"""What an export takes of a processor: flash, memory, stack, and what the compiler must bring with its library."""
+"""What a build takes of a processor, from its objects and its machine code: flash, memory, stack, library."""
 
 import re
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-NODE = re.compile(r'node: \{ title: "(?:[^"]*:)?([^":]+)" label: "[^"]*?(?:\\n(\d+) bytes \((\w+)\))?"')
-EDGE = re.compile(r'edge: \{ sourcename: "(?:[^"]*:)?([^":]+)" targetname: "(?:[^"]*:)?([^":]+)"')
+HEAD = re.compile(r"^([0-9a-f]+) <([^>]+)>:$")
+LINE = re.compile(r"^\s*([0-9a-f]+):\t[0-9a-f ]+\t(\S+)\s*(.*)$")
+PUSHED = re.compile(r"\{([^}]*)\}")
+LOWERED = (
+    (("sub", "sub.w", "subw"), re.compile(r"^sp, (?:sp, )?#(\d+)")),
+    (("str.w", "str", "strd"), re.compile(r"\[sp, #-(\d+)\]!")),
+    (("addi", "add"), re.compile(r"^sp,sp,-(\d+)")),  # RISC-V
+)
+FILLING = ("nop", "unimp")
+LEAVES = ("b", "b.n", "b.w", "bx", "j", "jr", "ret", "mret", "udf", "tail")
 
 
 @dataclass(frozen=True)
 class Sizes:
     """Of one build, in bytes."""
 
-    flash: int = 0  # code and constants of the unit, without parameters and the compiler's library
+    code: int = 0  # of the unit, without the compiler's library
+    constants: int = 0
     written: int = 0  # .data and .bss of it: 0
-    parameters: int = 0
+    parameters: int = 0  # without tables
+    tables: int = 0  # arrays among the parameters
     memory: int = 0  # of one instance: controller and lines
     stack: Mapping[str, int] = field(default_factory=dict[str, int])
-    """Of each entry with all that it calls, without the compiler's library; empty where the compiler does not tell."""
-    library: tuple[str, ...] = ()  # routines of the compiler's library, and of libm
+    """Of each entry with all that it calls, the compiler's library too."""
+    library: Mapping[str, int] = field(default_factory=dict[str, int])
+    """Code of each routine that it needs of the compiler's library, or of libm."""
+
+    @property
+    def flash(self) -> int:
+        """Code and constants of the unit alone."""
+        return self.code + self.constants
 
 
-def stacks(graph: str, entries: Sequence[str]) -> dict[str, int]:
-    """Deepest stack of each entry [byte], from the call graph that gcc writes with ``-fcallgraph-info=su``.
+@dataclass
+class Routine:
+    """A symbol of a program: what it takes of the stack at most, what it calls or goes on in."""
 
-    A routine of the library counts 0: the graph knows only its name. There is no recursion (FW06).
+    begin: int
+    end: int = 0
+    frame: int = 0
+    calls: set[str] = field(default_factory=set[str])
+
+
+def routines(listing: str) -> dict[str, Routine]:
+    """Every routine of a program, from its machine code as ``objdump -d`` lists it.
+
+    What a routine takes of the stack is the sum of all that it pushes or makes room for, wherever it does so: at least
+    what any way through it takes. One that does not leave at its end goes on in the next.
     """
-    own = {name: int(size or 0) for name, size, _ in NODE.findall(graph)}
-    calls: dict[str, set[str]] = {}
-    for caller, callee in EDGE.findall(graph):
-        calls.setdefault(caller, set()).add(callee)
+    found: dict[str, Routine] = {}
+    name, last = "", ""
+    for line in listing.splitlines():
+        head = HEAD.match(line)
+        if head:
+            begin = int(head[1], 16)
+            if name:
+                found[name].end = begin
+                if not _leaves(last):
+                    found[name].calls.add(head[2])
+            name, last = head[2], ""
+            found[name] = Routine(begin)
+            continue
+        told = LINE.match(line)
+        if not told or not name:
+            continue
+        word, rest, one = told[2], told[3], found[name]
+        one.end = int(told[1], 16) + 2
+        if word[0] == "." or word in FILLING:
+            continue
+        last = f"{word} {rest}"
+        one.frame += _taken(word, rest)
+        target = re.search(r"<([^>+]+)", rest)
+        if target and word[0] in "bjct" and target[1] != name:
+            one.calls.add(target[1])
+    return found
 
-    def deepest(name: str) -> int:
-        """Of a function and what it calls."""
-        return own.get(name, 0) + max((deepest(one) for one in sorted(calls.get(name, ()))), default=0)
 
-    return {name: deepest(name) for name in entries if name in own}
+def _leaves(line: str) -> bool:
+    word, _, rest = line.partition(" ")
+    return not line or word in LEAVES or (word.startswith(("pop", "ldm")) and "pc}" in rest)
 
 
-def sizes_of(tools: str, work: Path, entries: Sequence[str]) -> Sizes:
-    """Of the objects in a folder, by the binutils whose names begin with `tools`."""
-    said = _told([f"{tools}size", "unit.o"], work).splitlines()
-    if len(said) < 2:
+def _taken(word: str, rest: str) -> int:
+    """Bytes by which an instruction lowers the stack pointer."""
+    if word.startswith(("push", "vpush")) or (word.startswith("stmdb") and rest.startswith("sp!")):
+        listed = PUSHED.search(rest)
+        return sum(_pushed(one.strip()) for one in listed[1].split(",")) if listed else 0
+    for words, pattern in LOWERED:
+        lowered = pattern.search(rest) if word in words else None
+        if lowered:
+            return int(lowered[1])
+    return 0
+
+
+def _pushed(registers: str) -> int:
+    """Bytes of a register, or of a range of them."""
+    first, _, last = registers.partition("-")
+    size = 8 if first[0] == "d" else 4
+    return size * (int(last[1:]) - int(first[1:]) + 1) if last else size
+
+
+def deepest(name: str, known: Mapping[str, Routine], path: tuple[str, ...] = ()) -> int:
+    """Stack of a routine with all that it calls; there is no recursion (FW06), so what returns to `path` is a jump."""
+    one = known.get(name)
+    if one is None or name in path:
+        return 0
+    return one.frame + max((deepest(each, known, (*path, name)) for each in sorted(one.calls)), default=0)
+
+
+def reached(names: Iterable[str], known: Mapping[str, Routine]) -> dict[str, int]:
+    """Bytes of these routines, and of all that they call."""
+    waiting, found = [one for one in names if one in known], dict[str, int]()
+    for name in waiting:
+        if name not in found:
+            found[name] = known[name].end - known[name].begin
+            waiting += [one for one in known[name].calls if one in known]
+    return dict(sorted(found.items()))
+
+
+def sizes_of(tools: str, work: Path, entries: Iterable[str], program: str = "", tables: int = 0) -> Sizes:
+    """Of the objects in a folder and of the program with them, by the binutils whose names begin with `tools`."""
+    sections = {
+        words[0]: int(words[1])
+        for words in (line.split() for line in _told([f"{tools}size", "-A", "unit.o"], work).splitlines())
+        if len(words) == 3 and words[1].isdigit()
+    }
+    if not sections:
         return Sizes()
-    text, data, bss = (int(word) for word in said[1].split()[:3])
     symbols = {
         words[3]: int(words[1], 16)
         for part in ("params.o", "replay.o")
@@ -53,13 +141,19 @@ def sizes_of(tools: str, work: Path, entries: Sequence[str]) -> Sizes:
         if len(words) == 4
     }
     needed = [line.split()[-1] for line in _told([f"{tools}nm", "-u", "unit.o"], work).splitlines()]
-    graph = work / "unit.ci"
+    told = _told([f"{tools}readelf", "-sW", program], work) if program else ""
+    data = {words[7] for words in (line.split() for line in told.splitlines()) if words[3:4] == ["OBJECT"]}
+    listing = _told([f"{tools}objdump", "-d", program], work) if program else ""
+    known = {name: one for name, one in routines(listing).items() if name not in data}
+    defaults = next((size for name, size in symbols.items() if name.endswith("_defaults")), 0)
+
+    def whole(*kinds: str) -> int:
+        return sum(size for name, size in sections.items() if name.startswith(kinds))
+
     return Sizes(
-        text, data + bss,
-        next((size for name, size in symbols.items() if name.endswith("_defaults")), 0),
-        symbols.get("c_", 0) + symbols.get("l_", 0),
-        stacks(graph.read_text(encoding="utf-8"), entries) if graph.is_file() else {},
-        tuple(sorted(needed)),
+        whole(".text"), whole(".rodata", ".srodata"), whole(".data", ".bss", ".sdata", ".sbss"),
+        defaults - tables if defaults else 0, tables, symbols.get("c_", 0) + symbols.get("l_", 0),
+        {one: deepest(one, known) for one in entries if one in known}, reached(needed, known),
     )  # fmt: skip
 
 

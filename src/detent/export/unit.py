@@ -6,8 +6,9 @@ Its state is the controller and its lines; the simulation calls the very steps t
 import inspect
 import re
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import Any, get_args
 
@@ -56,10 +57,10 @@ class ControlUnit:
         rows += [f"{name.removeprefix(self.name)} {' '.join(taken)}" for name, taken in self.calls.items()]
         return zlib.crc32("\n".join(rows).encode())
 
-    def translated(self, params: Registers, tunable: bool = False) -> Program:  # noqa: FBT001, FBT002 - one switch
-        """The unit in C, with the options of these parameters folded in unless they stay tunable."""
+    def translated(self, params: Registers, tunable: Sequence[str] = (), fixed: Sequence[str] = ()) -> Program:
+        """The unit in C, with the options of these parameters folded in but for `tunable`, and `fixed` too."""
         roots = {self.params: "params", self.controller: "controller", self.lines: "lines"}
-        return Program(self.name, self.entries, self.params, {} if tunable else options_of(params), roots)
+        return Program(self.name, self.entries, self.params, folded(params, tunable, fixed), roots)
 
 
 def arguments(step: Callable[..., Any], roots: Mapping[type[Registers], str]) -> Iterator[str]:
@@ -90,6 +91,48 @@ def options_of(params: Registers) -> dict[tuple[type[Registers], str], float]:
 
     walk(params)
     return {place: values.pop() for place, values in found.items() if len(values) == 1}
+
+
+def folded(
+    params: Registers, tunable: Sequence[str] = (), fixed: Sequence[str] = ()
+) -> dict[tuple[type[Registers], str], float]:
+    """Values of the parameters that become constants: options but for `tunable`, and those of the patterns `fixed`.
+
+    Refused: a pattern that meets none, a table, and a parameter whose class occurs elsewhere with another value.
+    """
+    found, paths = options_of(params), dict[tuple[type[Registers], str], list[tuple[str, Any, int]]]()
+
+    def walk(registers: Registers, prefix: str) -> None:
+        for field, value in members(registers):
+            if field.block is not None:
+                walk(value, f"{prefix}{field.name}.")
+            else:
+                paths.setdefault((type(registers), field.name), []).append((prefix + field.name, value, field.length))
+
+    walk(params, "")
+    for option, patterns in (("--tunable", tunable), ("--fixed", fixed)):
+        for pattern in patterns:
+            places = [key for key, rows in paths.items() if any(fnmatchcase(path, pattern) for path, _, _ in rows)]
+            if not places:
+                raise DetentError(f"{option}: got {pattern}; expected: names of params.csv, such as law.*; correct it")
+            for key in places:
+                if option == "--tunable":
+                    found.pop(key, None)
+                else:
+                    found[key] = _one_value(pattern, paths[key])
+    return found
+
+
+def _one_value(pattern: str, rows: Sequence[tuple[str, Any, int]]) -> float:
+    """The value of a parameter that is to be a constant, wherever its class occurs."""
+    others = [path for path, _, _ in rows if not fnmatchcase(path, pattern)]
+    if others or rows[0][2] or len({value for _, value, _ in rows}) > 1:
+        got = "a table" if rows[0][2] else f"{', '.join(f'{path} = {value}' for path, value, _ in rows)}"
+        raise DetentError(
+            f"--fixed {pattern}: got {got}; expected: a number that is the same wherever its class is used, all of "
+            "them meant; leave it tunable, or widen the pattern"
+        )
+    return rows[0][1]
 
 
 def members(registers: Registers) -> Iterator[tuple[Field, Any]]:

@@ -9,6 +9,7 @@ A file is little endian: "DTNV", version (1 byte), layout hash (4); then records
 | 3 check | hash (8), image of all registers | every 1000th tick, and after the last one |
 | 4 signal | number (1), length (4), values in their width | what the host has laid ready |
 | 5 call | number (1), arguments in their widths | what the host did: `ControlUnit.calls` by number |
+| 6 exchange | n (2); of n parameters number (2), element (2), value (8) | another set of parameters, by its pointer |
 | 0 end | ticks (8), hash of all bytes up to here (8) | |
 
 The state begins with all bits zero, and nothing but these calls and the wires of the plant touches it. An image is
@@ -33,7 +34,7 @@ from detent.kernel.loop import Bytes
 from detent.kernel.registers import PLANT, Leaf, Registers
 
 MAGIC, VERSION = b"DTNV", 2
-END, WRITE, TICKS, CHECK, SIGNAL, CALL = range(6)
+END, WRITE, TICKS, CHECK, SIGNAL, CALL, EXCHANGE = range(7)
 FORMATS = {
     "u1": "B", "u2": "H", "u4": "I", "i1": "b", "i2": "h", "i4": "i", "i8": "q", "f8": "d",
 }  # fmt: skip
@@ -50,7 +51,8 @@ class Golden:
 
     def __init__(self, unit: ControlUnit, state: type[Registers], most: int) -> None:
         self.unit, self.motor, self.most, self.ticks = unit, unit.motor, most, 0
-        self.params: Any = None
+        self.params: Any = None  # at power-on
+        self.changed: set[int] = set()  # numbers of the parameters that are exchanged later
         self.hash = begin_hash()
         self.signals: list[tuple[int, int]] = []  # of each signal: its largest length, and bytes of an element
         self.parts = [MAGIC + struct.pack("<BI", VERSION, unit.layout_hash)]
@@ -69,6 +71,7 @@ class Golden:
         self._columns = {k: slice(int(where[n]), int(where[n + 1])) for n, k in enumerate(small)}
         self.rows: Bytes = np.zeros((STRETCH, len(self.picks)), np.uint8)
         self._known = bytes(sizes + ctypes.sizeof(unit.lines))
+        self._set = b""  # the parameters as they are
         self._feed: tuple[bytes, ...] = ()
         self._actions = list(unit.entries.items())[1:]
         self._state: Any = None
@@ -88,9 +91,9 @@ class Golden:
     def begin(self, params: Any, state: Any, feed: tuple[Any, ...]) -> None:
         """Note what the host has written since the last stretch."""
         if self.params is None:
-            self.params = params.controller.copy()
-        elif bytes(self.params) != bytes(params.controller):
-            raise EnoughError  # the parameters of a firmware stand still: what comes is another run
+            self.params, self._set = params.controller.copy(), bytes(params.controller)
+        elif self._set != bytes(params.controller):
+            raise EnoughError  # nobody has exchanged them: what comes is another run
         laid = tuple(bytes(memoryview(one).cast("B")) for one in feed)
         for number, (new, one) in enumerate(zip(laid, feed, strict=True)):
             size = ctypes.sizeof(one._type_)
@@ -101,6 +104,20 @@ class Golden:
                 self.parts.append(struct.pack("<BBI", SIGNAL, number, len(one)) + new)
         self._feed = laid
         self._look(state)
+
+    def exchange(self, params: Any) -> None:
+        """Note another set of parameters."""
+        new, found = bytes(params.controller), list[bytes]()
+        for number, leaf in enumerate(params.controller.leaves()):
+            width = leaf.width.size
+            for k in range(max(leaf.length, 1)):
+                at = slice(leaf.offset + k * width, leaf.offset + (k + 1) * width)
+                if self.params is not None and new[at] != self._set[at]:
+                    found.append(struct.pack("<HH", number, k) + new[at].ljust(8, b"\0"))
+                    self.changed.add(number)
+        self._set = new
+        if found:
+            self.parts.append(struct.pack("<BH", EXCHANGE, len(found)) + b"".join(found))
 
     def act(self, params: Any, state: Any, action: Callable[..., Any], args: tuple[Any, ...]) -> Any:
         """Let the host act, and note the call."""

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,6 @@ from detent.axis import Axis
 from detent.errors import DetentError
 from detent.export.code import FLAGS, WARNINGS, short_hash, template
 from detent.export.drawn import Chance, Row
-from detent.export.sizes import Sizes, sizes_of
 from detent.export.unit import unit_named
 from detent.export.write import changed_files, export_firmware, manifest_of
 
@@ -96,7 +95,6 @@ class Proof:
     level: str
     equal: bool
     told: str  # the hash, or what differs
-    sizes: Sizes = field(default_factory=Sizes)
 
 
 def verify(
@@ -146,52 +144,59 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
     name, source = manifest["name"], folder.resolve()
     with tempfile.TemporaryDirectory() as made:
         work = Path(made)
-        graph = "-fcallgraph-info=su" if target.compiler.endswith("gcc") else ""
-        strict = f"{target.compiler} {FLAGS} {level} {target.flags} {WARNINGS} {graph} -Werror -I{source} -c"
-        told = _run([*strict.split(), str(source / f"{name}.c"), "-o", "unit.o"], work)
-        compiling = f"{target.compiler} {FLAGS} {level} {target.flags} -DSHARE={target.share} -I{source} -c".split()
-        files = {f"{part}.o": (f"{name}_{part}.c", "") for part in ("params", "image", "replay", "drawn")}
-        files |= {f"board_{kind}.o": ("board.c", f"vectors/{kind}.vec") for kind in ("job", "drawn")}
-        for made_file, (file, vectors) in files.items():
-            more = [f'-DVECTORS="{source / vectors}"'] if vectors else []
-            told = told or _run([*compiling, *more, str(source / file), "-o", made_file], work)
+        strict = f"{target.compiler} {FLAGS} {level} {target.flags} {WARNINGS} -Werror -I{source} -c"
+        told = run_tool([*strict.split(), str(source / f"{name}.c"), "-o", "unit.o"], work)
+        told = told or compile_parts(source, name, target, level, work)
         # The program of the random vectors holds the unit's own text, and sees its inner functions.
         programs = {"job": ("unit", "replay"), "drawn": ("drawn",)}
         for program, parts in programs.items():
-            objects = [f"{part}.o" for part in (*parts, "params", "image", f"board_{program}")]
-            told = told or _run(_linking(work, target, level, program, objects), work)
+            told = told or link(work, target, level, program, (*parts, f"board_{program}"))
         if told:
             return Proof(target.name, level, equal=False, told=f"does not compile: {told}")
-        entries = [row.split(",")[0] for row in (source / "trace.csv").read_text(encoding="utf-8").splitlines()[1:]]
-        sizes = sizes_of(target.compiler.removesuffix("gcc") if target.emulator else "", work, entries)
-        drawn = _answer(target, work, source, "drawn").splitlines()
-        job = _answer(target, work, source, "job").splitlines()
+        drawn = answer(target, work, source, "drawn").splitlines()
+        job = answer(target, work, source, "job").splitlines()
     told = [told_of_drawn(folder, manifest, drawn)] if not any(one.startswith("drawn equal ") for one in drawn) else []
     told += [told_of(folder, job)] if f"equal {manifest['ticks']} {manifest['hash']}" not in job else []
-    return Proof(target.name, level, not told, "; job ".join(told) or manifest["hash"], sizes)
+    return Proof(target.name, level, not told, "; job ".join(told) or manifest["hash"])
 
 
-def _linking(work: Path, target: Target, level: str, program: str, objects: Sequence[str]) -> list[str]:
+def compile_parts(  # noqa: PLR0913 - what, for which processor, and where
+    source: Path, name: str, target: Target, level: str, work: Path, more: str = ""
+) -> str:
+    """Compile all around the unit; what the compiler says where it refuses, else nothing."""
+    command = f"{target.compiler} {FLAGS} {level} {target.flags} -DSHARE={target.share} -I{source} {more} -c".split()
+    files = {f"{part}.o": (f"{name}_{part}.c", "") for part in ("params", "image", "replay", "drawn")}
+    files |= {f"board_{kind}.o": ("board.c", f"vectors/{kind}.vec") for kind in ("job", "drawn")}
+    told = ""
+    for made, (file, vectors) in files.items():
+        given = [f'-DVECTORS="{source / vectors}"'] if vectors else []
+        told = told or run_tool([*command, *given, str(source / file), "-o", made], work)
+    return told
+
+
+def link(work: Path, target: Target, level: str, program: str, parts: Sequence[str]) -> str:
+    """Link a program of these parts, parameters and image; what the linker says where it refuses, else nothing."""
     more: list[str] = []
     if target.memory is not None:
         (work / "board.ld").write_text(template("board.ld.in", **target.memory), encoding="utf-8")
         more = ["-T", "board.ld", "-Wl,-e," + ("entry_" if target.name == "rv32" else "Start")]
+    objects = [f"{part}.o" for part in (*parts, "params", "image")]
     command = [target.compiler, *level.split(), *target.flags.split(), *more]
-    return [*command, *objects, "-o", program, *target.libraries.split()]
+    return run_tool([*command, *objects, "-o", program, *target.libraries.split()], work)
 
 
-def _run(command: list[str], work: Path) -> str:
+def run_tool(command: list[str], work: Path) -> str:
     """Run a compiler; what it says where it refuses, else nothing."""
     done = subprocess.run(command, cwd=work, capture_output=True, text=True, check=False)  # noqa: S603 - found on the path
     return "" if done.returncode == 0 else (done.stderr or done.stdout or "no word").strip().splitlines()[0]
 
 
-def _answer(target: Target, work: Path, source: Path, program: str) -> str:
-    """What a replay says."""
+def answer(target: Target, work: Path, source: Path, program: str, more: str = "") -> str:
+    """What a replay says; `more` are arguments of the emulator."""
     command = [f"./{program}", str(source / f"vectors/{program}.vec")]
     if target.emulator:
         rest = "-nographic -monitor none -serial none -semihosting-config enable=on,target=native"
-        command = [target.emulator, *target.machine.split(), *rest.split(), "-kernel", program]
+        command = [target.emulator, *target.machine.split(), *rest.split(), *more.split(), "-kernel", program]
     try:
         done = subprocess.run(  # noqa: S603 - found on the path
             command, cwd=work, capture_output=True, text=True, errors="replace", check=False, timeout=TIMEOUT,
@@ -225,7 +230,7 @@ def chance_of(folder: Path, manifest: Mapping[str, Any]) -> Chance | None:
     if unit is None or len(data) != ctypes.sizeof(unit.params):
         return None
     params = unit.params.from_buffer_copy(data)
-    program = unit.translated(params)
+    program = unit.translated(params, **manifest["folding"])
     steps = {f"{one.place.rpartition(':')[0]} {one.py.__qualname__}": one.source for one in program.order}
     hashes = {name: short_hash(source.encode()) for name, source in steps.items()}
     return Chance(unit, program, params) if hashes == _steps(folder) else None
@@ -287,7 +292,7 @@ def differences(folder: str | Path, axis: Axis, job: str | Path | None = None) -
     with tempfile.TemporaryDirectory() as made:
         new = export_firmware(
             axis, Path(made) / "new", job=job, motor=manifest["motor"], prefix=manifest["name"],
-            ticks=max(1, int(manifest["ticks"])), **manifest["drawn"],
+            ticks=max(1, int(manifest["ticks"])), **manifest["drawn"], **manifest["folding"],
         )  # fmt: skip
         before, after = (_steps(one) for one in (place, new.folder))
         for step in sorted(before.keys() | after.keys()):

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -12,13 +12,13 @@ from detent import __version__
 from detent.axis import Axis
 from detent.errors import DetentError, InputError
 from detent.export.a2l import a2l_text
-from detent.export.code import FLAGS, as_json, drawn_text, parameters, registers, seconds, texts
+from detent.export.code import FLAGS, as_json, drawn_text, parameters, registers, seconds, signals_of, texts
 from detent.export.drawn import FILES, ROUNDS, Chance, drawn_vectors
 from detent.export.serial import serial_texts
-from detent.export.translate.program import Program
+from detent.export.translate.program import Function, Program
 from detent.export.translate.values import RefusedError
 from detent.export.unit import ControlUnit, options_of, outside_ranges, unit_of
-from detent.export.vectors import Golden, record
+from detent.export.vectors import FORMATS, Golden, record
 from detent.files.text import write_errors
 from detent.methods.check import check_spec
 
@@ -33,6 +33,7 @@ class Exported:
     folder: Path
     name: str  # prefix of all names in C
     manifest: Mapping[str, Any]
+    unproven: Mapping[str, int]  # how many places of each kind were not proven in the earlier export; empty without one
 
 
 def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may be chosen
@@ -45,6 +46,8 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
     ticks: int = TICKS,
     files: int = FILES,
     rounds: int = ROUNDS,
+    tunable: Sequence[str] = (),
+    fixed: Sequence[str] = (),
 ) -> Exported:
     """Write the controller of an axis as C99, with golden vectors of a job.
 
@@ -66,6 +69,10 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
         Random register files that each function is called on, 0 for none.
     rounds : int
         Ticks in which the host does anything and the lines show anything, 0 for none.
+    tunable : sequence of str
+        Patterns of names of options that stay parameters.
+    fixed : sequence of str
+        Patterns of names of parameters that become constants of the code.
 
     Returns
     -------
@@ -94,9 +101,13 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
     for path, value, (lo, hi) in outside_ranges(golden.params):
         got = f"{path} = {value}"
         raise RefusedError("FW12", None, got, f"{lo} to {hi}", "change the axis file until the value fits")
-    program = unit.translated(golden.params)
+    program = unit.translated(golden.params, tunable, fixed)
     code = texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)) | serial_texts(axis, unit, axis.name)
     made: dict[str, bytes] = {name: text.encode() for name, text in code.items()}
+    for row in parameters(program, golden.params):
+        if row.number in golden.changed and not row.expression:
+            got = f"{loaded.name}, which changes {row.name}: {row.tunable}"
+            raise DetentError(f"--fixed: got {got}; expected: a job that changes what is tunable; leave it tunable")
     chance = Chance(unit, program, golden.params)
     rows = ([asdict(one) for one in some] for some in (parameters(program, golden.params), registers(unit)))
     made[f"{unit.name}.a2l"] = a2l_text(unit.name, axis.name, __version__, *rows).encode()
@@ -106,28 +117,50 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
     made["vectors/drawn.vec"] = drawn_vectors(chance, files, rounds)
     manifest = _manifest(axis, loaded.name, golden, program)
     manifest["drawn"] = {"files": files, "rounds": rounds}
+    manifest["folding"] = {"tunable": list(tunable), "fixed": list(fixed)}
     made["README.md"] = readme(manifest, unit, seconds(axis.simulated.tick)).encode()
     manifest["files"] = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(made.items())}
     made[MANIFEST] = as_json(manifest).encode()
+    before = (read_manifest(target) or {}).get("not proven", {})
     _write(target, made)
-    return Exported(target, unit.name, manifest)
+    return Exported(target, unit.name, manifest, {what: len(rows) for what, rows in before.items()})
 
 
 def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[str, Any]:
     """What an export was made from, and what is not proven of it."""
+    told = {f"{one.__name__}.{key}": value for (one, key), value in program.options.items()}
+    options = [f"{one.__name__}.{key}" for one, key in options_of(golden.params)]
     return {
         "detent": __version__, "name": golden.unit.name, "axis": axis.name, "motor": golden.unit.motor,
         "method": axis.method.name, "job": job,
         "ticks": golden.ticks, "hash": f"{golden.hash.number:016x}", "flags": FLAGS,
         "values": {row.key: row.value for row in check_spec(axis.file).rows},
-        "options": {f"{one.__name__}.{key}": value for (one, key), value in options_of(golden.params).items()},
-        "functions": len(program.order),
-        "loops": sorted(f"{where}: {text}" for where, text in program.notes.loops),
+        "options": {key: value for key, value in told.items() if key in options},
+        "fixed": {key: value for key, value in told.items() if key not in options},
+        "calls": [[name, [one for one in takes if one in FORMATS]] for name, takes in golden.unit.calls.items()],
+        "signals": [one.width.code for one in signals_of(golden.unit, program) if one.width],
+        "image": sum(leaf.width.size * max(leaf.length, 1) for leaf in golden.unit.leaves),
+        "functions": len(program.order), "tick": axis.simulated.tick,
+        "entries": {f.cname: {"loops": loops_of(program, f)} for f in program.order if f.entry},
         "not proven": {
             "ranges that only their declaration says": sorted(f"{w}: {t}" for w, t in program.notes.claims),
             "stores and arithmetic that may wrap": sorted(f"{w}: {t}" for w, t in program.notes.wraps),
         },
     }  # fmt: skip
+
+
+def loops_of(program: Program, entry: Function) -> list[str]:
+    """Loops that an entry can come to, with place and bound."""
+    reached = [entry]
+    for f in reached:
+        reached += [program.steps[g] for g in f.reaches if program.steps[g] not in reached]
+    ends = [(f.where(None).rpartition(":")[0], f.first, f.first + f.source.count("\n")) for f in reached]
+
+    def inside(where: str) -> bool:
+        file, _, line = where.rpartition(":")
+        return any(file == one and first <= int(line) <= last for one, first, last in ends)
+
+    return sorted(f"{where}: {text}" for where, text in program.notes.loops if inside(where))
 
 
 def read_manifest(folder: Path) -> dict[str, Any] | None:

@@ -101,6 +101,7 @@ def _compiled(function: F, *, forceinline: bool) -> F:
     # No step is called by address, so none needs the wrapper for it: a sixth less to compile.
     made: Any = numba.njit(error_model="numpy", nogil=True, forceinline=forceinline, no_cfunc_wrapper=True)(function)
     if config.DISABLE_JIT:
+        made.py_func = made  # so that a plain step is known as one, too: an export translates no other functions
         return cast("F", made)
     _compile_once(made)
     if Path(function.__code__.co_filename).resolve() in step_sources():

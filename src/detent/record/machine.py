@@ -34,6 +34,10 @@ class Witness(Protocol):
         """A stretch begins; the host has written what it wants."""
         ...
 
+    def exchange(self, params: Any) -> None:
+        """Another set of parameters from the next tick on."""
+        ...
+
     def take(self, ticks: int) -> None:
         """So many ticks have passed."""
         ...
@@ -64,6 +68,8 @@ class Machine(Generic[P, S]):
     ) -> None:
         self.params, self.state, self.tick, self.recorder = params, state, tick, recorder
         self._advance, self._by_clocks, self._feed = advance, by_clocks, feed
+        self.changes: list[tuple[int, Callable[[P], None]]] = []
+        """What writes another set of parameters before which tick, in the order of time."""
         self._clock: Any = state  # every axis's state has a field `tick`, which the base class cannot name
         self._no_rows = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))
 
@@ -87,12 +93,20 @@ class Machine(Generic[P, S]):
         """Let at most so many ticks pass; returns how many did: fewer when the axis waits for its host."""
         left = ticks
         while left > 0:
-            asked = min(left, LONGEST_STRETCH)
+            asked = min(left, LONGEST_STRETCH, self._to_change())
             done = self._run(asked)
             left -= done
             if done == 0:
                 break
         return ticks - left
+
+    def _to_change(self) -> int:
+        """Make the changes of parameters that are due; ticks until the next one."""
+        while self.changes and self.changes[0][0] <= self._clock.tick:
+            self.changes.pop(0)[1](self.params)
+            if self.recorder is not None and not isinstance(self.recorder, Recorder | Capture):
+                self.recorder.exchange(self.params)
+        return self.changes[0][0] - self._clock.tick if self.changes else LONGEST_STRETCH
 
     def _run(self, ticks: int) -> int:
         r, now = self.recorder, self._clock.tick

@@ -209,8 +209,7 @@ class Statements(Calls):
             raise RefusedError(
                 "FW10", node, "a call that writes beside what reads", "one of them", "split the condition"
             )
-        if self.final:
-            self.program.notes.loops.add((self.f.where(node), f"at most {bound[0]} turns: {bound[1]}"))
+        self._bound(node, f"at most {bound[0]} turns: {bound[1]}")
         self.line(f"while ({test.text}) {{")
         self.suppose(node.test, holds=True)
         self.inside(node.body)
@@ -218,6 +217,11 @@ class Statements(Calls):
         self.facts = begin
         if not any(isinstance(one, ast.Break) for stmt in node.body for one in ast.walk(stmt)):
             self.suppose(node.test, holds=False)
+
+    def _bound(self, node: ast.AST, text: str) -> None:
+        """Note how often a loop turns."""
+        if self.final:
+            self.program.notes.loops.add((self.f.where(node), text))
 
     def s_For(self, node: ast.For) -> None:  # noqa: N802
         """``for`` over a range, or over a tuple of numbers."""
@@ -238,6 +242,7 @@ class Statements(Calls):
             raise outside_language(node, ast.unparse(node.iter), "use range(stop) or range(start, stop)")
         start, stop = ends if len(ends) == 2 else (number(0), ends[0])
         lo, hi = start.lo, max(start.lo, stop.hi - 1)
+        self._bound(node, f"at most {max(0, stop.hi - start.lo)} turns: {ast.unparse(node.iter)}")
         counter = self.note(name, whole(name, "", min(lo, stop.lo), stop.hi))
         ctype = type_of_local(counter)
         text = stop.text
@@ -263,6 +268,7 @@ class Statements(Calls):
                 node, f"a loop over {ast.unparse(node.iter)}", "use range, or a tuple of whole numbers"
             )
         value = self.note(name, whole(name, "", min(one.lo for one in items), max(one.hi for one in items)))
+        self._bound(node, f"{len(items)} turns: {ast.unparse(node.iter)}")
         ctype, array, k = type_of_local(value), self.temporary(), self.temporary()
         self.line(f"static const {ctype} {array}[{len(items)}] = {{{', '.join(one.text for one in items)}}};")
         self.line(f"for (int32_t {k} = 0; {k} < {len(items)}; {k}++) {{")

@@ -80,8 +80,8 @@ class CascadeMethod(Method[CascadeSpec]):
         return self.brought(place)(spec, job, recorder=recorder, progress=progress)
 
     def batch(self, spec: CascadeSpec, job: Any) -> Any:
-        """Moves on many axes at once; recordings one by one."""
-        return None if job.kind == "replay" else super().batch(spec, job)
+        """Moves on many axes at once; recordings, and parameters that change, one by one."""
+        return None if job.kind == "replay" or job.changes else super().batch(spec, job)
 
     def sample_job(self, spec: CascadeSpec) -> MoveJob:
         """A short way to where there is more room."""

@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
-from detent.files.fields import Table, optional, rows
+from detent.files.fields import Table, optional, required, rows
 from detent.files.quantities import Angle, AngularVelocity, Length, Time, Velocity
 from detent.files.read import Row, check_values, read_tables
 from detent.files.read_csv import CsvRows
@@ -61,11 +61,20 @@ class RotaryMoveRow(MoveRow, frozen=True):
     speed: AngularVelocity | None = optional("speed of this move", None, derived="the axis's own", gt=0)
 
 
+class ChangeRow(Table, frozen=True):
+    """A change of a parameter as a file says it."""
+
+    time: Time = required("time since power-on", "1 s", ge=0)
+    name: str = required("parameter of the controller, as in params.csv of an export", "law.cascade.position_gain")
+    value: float = required("its value from then on, in the unit of params.csv", "45.0")
+
+
 class MoveFile(Table, Generic[AnyRow], frozen=True):
     """A file of moves."""
 
     repeat: int = optional("number of repetitions of the whole list", 1, ge=1, le=MOST_MOVES)
     move: list[AnyRow] = rows("a move")
+    parameter_change: list[ChangeRow] = rows("a parameter of the controller that changes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +107,16 @@ class Move:
         check_values(MoveRow, f"move {self.number}", {name: getattr(self, name) for name in names})
 
 
+@dataclass(frozen=True, slots=True)
+class ParameterChange:
+    """A parameter of the controller that has another value from a time on."""
+
+    row: int  #: line of the file, from 1
+    time: float  #: since power-on [s], 0 or more
+    name: str  #: as `detent export firmware` lists it in params.csv
+    value: float  #: in the unit of that list
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class MoveJob(OnScreen):
     """A list of moves."""
@@ -105,6 +124,7 @@ class MoveJob(OnScreen):
     name: str  #: name of the file, without its folders
     kind: str  #: "moves", or "text" where each move is a character
     moves: tuple[Move, ...]  #: in order, numbered from 1; repeats are written out
+    changes: tuple[ParameterChange, ...] = ()  #: parameters of the controller that change on the way
 
     @property
     def count(self) -> int:
@@ -230,7 +250,7 @@ def load_moves(
 
 def _parse_moves(file: Path, text: str, model: type[MoveRow]) -> MoveJob:
     """Moves of a text, in the format that the file's name says."""
-    repeat = 1
+    repeat, changes = 1, ()
     if file.suffix.lower() == ".csv":
         made = CsvRows(str(file), text, model).read(_make_move, MOST_MOVES)
     else:
@@ -238,7 +258,11 @@ def _parse_moves(file: Path, text: str, model: type[MoveRow]) -> MoveJob:
         found = read_tables(source, MoveFile[model])
         repeat = found.repeat
         made = [_make_move(source.line_of("move", number), row) for number, row in enumerate(found.move)]
-    return MoveJob(file.name, "moves", expand_moves(str(file), made, repeat))
+        changes = tuple(
+            ParameterChange(source.line_of("parameter_change", number), **row.model_dump())
+            for number, row in enumerate(found.parameter_change)
+        )
+    return MoveJob(file.name, "moves", expand_moves(str(file), made, repeat), changes)
 
 
 def _make_move(line: int, row: MoveRow) -> tuple[Move, int]:
