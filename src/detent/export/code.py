@@ -17,7 +17,7 @@ from detent.export.drawn import FAR, PLACES, SEED, Chance, Row, drawn_from
 from detent.export.translate.program import Function, Program
 from detent.export.translate.text import code_text, comment_of, signals_text, struct_texts
 from detent.export.translate.values import c_field, interval_of, number, type_of_local
-from detent.export.unit import LARGE, ControlUnit, members
+from detent.export.unit import LARGE, ControlUnit, every, members
 from detent.export.vectors import Golden
 from detent.kernel.registers import Field, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
 
@@ -95,13 +95,16 @@ class Parameter:
 def parameters(program: Program, params: Registers) -> Iterator[Parameter]:
     """Every parameter, in the order of declaration."""
     for count, (prefix, registers, field, width) in enumerate(_fields(params, "")):
-        folded = (type(registers), field.name) in program.options
+        place = (type(registers), field.name)
+        folded, is_table = place in program.options, place in program.shape.tables
         value = getattr(registers, field.name)
         default = f"{len(value)} values" if field.length else repr(value)
         yield Parameter(
-            count, prefix + field.name, "" if folded else place_of(f"p.{prefix}{field.name}", parameters="p->"),
+            count, prefix + field.name,
+            "" if folded or is_table else place_of(f"p.{prefix}{field.name}", parameters="p->"),
             width.code, field.length, field.unit, range_text(field.range), default,
-            "an option, folded into the code" if folded else "yes", field.doc,
+            "an option, folded into the code" if folded else "a table among the constants" if is_table else "yes",
+            field.doc,
         )  # fmt: skip
 
 
@@ -236,6 +239,10 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
         "code": code, "checks": list(range_checks(program, params)), "floats": floats, "images": list(images.items()),
     }  # fmt: skip
     made = {f"{name}.h": template("unit.h.in", **given), f"{name}.c": template("unit.c.in", **given)}
+    if program.shape.tables:
+        values = {one: getattr(registers, field.name) for _, registers, field, _ in every(params)
+                  for one in [program.shape.tables.get((type(registers), field.name))] if one}  # fmt: skip
+        made[f"{name}_tables.c"] = template("tables.c.in", name=name, NAME=name.upper(), tables=list(values.items()))
     made[f"{name}_image.c"] = template("image.c.in", **given)
     initialiser = _initialiser(program, params)
     text = template("params.c.in", name=name, initialiser=initialiser)
@@ -250,7 +257,8 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
     made["params.csv"] = table(parameters(program, params))
     made["registers.csv"] = table(registers(unit))
     made["trace.csv"] = table(traced(program, made[f"{name}.c"]))
-    made["build.mk"] = f"{name}_CFLAGS := {FLAGS}\n{name}_SOURCES := {name}.c {name}_params.c\n"
+    sources = [f"{name}{part}.c" for part in ("", "_params", "_tables") if f"{name}{part}.c" in made]
+    made["build.mk"] = f"{name}_CFLAGS := {FLAGS}\n{name}_SOURCES := {' '.join(sources)}\n"
     return made
 
 
@@ -280,7 +288,7 @@ def _row_in_c(row: Row) -> dict[str, Any]:
 def _call_in_c(chance: Chance, f: Function) -> list[str]:
     """Statements that draw the arguments of a function, call it, and return the bits of its result."""
     program, lines, told, signals = chance.program, list[str](), list[str](), 0
-    for k, name in enumerate(f.parameters):
+    for k, name in enumerate(program.arguments(f)):
         value: Any = f.names[name]
         if value.kind == "file":
             kind = ("const " if value.registers in program.fixed else "") + program.struct(value.registers)
@@ -304,7 +312,7 @@ def _call_in_c(chance: Chance, f: Function) -> list[str]:
             lines.append(f"const {kind} a{k} = ({kind})draw_whole({least}, {most}, {count});")
             told.append(f"(uint64_t)a{k}")
     lines += [f"told_[{k}] = {one};" for k, one in enumerate(told)] + [f"arguments_ = {len(told)};"]
-    call = f"{f.cname}({', '.join(f'a{k}' for k in range(len(f.parameters)))})"
+    call = f"{f.cname}({', '.join(f'a{k}' for k in range(len(program.arguments(f))))})"
     forms = {"int": "return (uint64_t){};", "bool": "return {} ? 1u : 0u;", "float": "return real_bits({});"}
     return [*lines, *forms.get(f.result_kind, "(void){};\nreturn 0;").format(call).splitlines()]
 
@@ -325,7 +333,7 @@ def drawn_text(chance: Chance) -> str:
         for one in sorted((one for one in widths if one), key=lambda one: one.code)
     ]
     roots = {chance.unit.params: "&p_", chance.unit.controller: "&c_", chance.unit.lines: "&l_"}
-    values: list[Any] = [chance.tick.names[one] for one in chance.tick.parameters]
+    values: list[Any] = [chance.tick.names[one] for one in program.arguments(chance.tick)]
     given = [roots[value.registers] for value in values if value.kind == "file"]
     given += [f"feed{k}_" for k in range(len(feed))]
     functions = [{"name": f.cname, "lines": _call_in_c(chance, f)} for f in program.order]

@@ -14,7 +14,7 @@ from typing import Any, get_args
 from detent.axis import Axis
 from detent.errors import DetentError
 from detent.export.translate.program import Program
-from detent.export.translate.values import C_WORDS, RefusedError
+from detent.export.translate.values import C_WORDS, RefusedError, Shape, Table
 from detent.kernel.loop import control_of
 from detent.kernel.registers import Field, Leaf, Registers, Width
 from detent.methods.registry import METHODS
@@ -59,7 +59,8 @@ class ControlUnit:
     def translated(self, params: Registers, tunable: bool = False) -> Program:  # noqa: FBT001, FBT002 - one switch
         """The unit in C, with the options of these parameters folded in unless they stay tunable."""
         roots = {self.params: "params", self.controller: "controller", self.lines: "lines"}
-        return Program(self.name, self.entries, self.params, {} if tunable else options_of(params), roots)
+        options, shape = {} if tunable else options_of(params), Shape(tables=tables_of(params, self.name))
+        return Program(self.name, self.entries, self.params, options, roots, shape)
 
 
 def arguments(step: Callable[..., Any], roots: Mapping[type[Registers], str]) -> Iterator[str]:
@@ -80,16 +81,30 @@ def arguments(step: Callable[..., Any], roots: Mapping[type[Registers], str]) ->
 def options_of(params: Registers) -> dict[tuple[type[Registers], str], float]:
     """Values of the parameters that choose a variant, where their class has one value wherever it occurs."""
     found: dict[tuple[type[Registers], str], set[float]] = {}
-
-    def walk(registers: Registers) -> None:
-        for field, value in members(registers):
-            if field.block is not None:
-                walk(value)
-            elif field.option:
-                found.setdefault((type(registers), field.name), set()).add(value)
-
-    walk(params)
+    for _, registers, field, value in every(params):
+        if field.option:
+            found.setdefault((type(registers), field.name), set()).add(value)
     return {place: values.pop() for place, values in found.items() if len(values) == 1}
+
+
+def tables_of(params: Registers, name: str) -> dict[tuple[type[Registers], str], Table]:
+    """Arrays of the parameters that are tables, where their class occurs once: constants of a unit of this name."""
+    found: dict[tuple[type[Registers], str], list[Table]] = {}
+    for path, registers, field, value in every(params):
+        if field.table and field.width is not None:
+            read = f"{name}_{field.width.code}".upper() + f"({name.upper()}_TABLE({{text}}), {{index}})"
+            made = Table(f"{name}_{path.replace('.', '_')}", field.width, field.length, (min(value), max(value)), read)
+            found.setdefault((type(registers), field.name), []).append(made)
+    return {place: tables[0] for place, tables in found.items() if len(tables) == 1}
+
+
+def every(registers: Registers, prefix: str = "") -> Iterator[tuple[str, Registers, Field, Any]]:
+    """Every register: its path, the register file that it stands in, its declaration and its value."""
+    for field, value in members(registers):
+        if field.block is not None:
+            yield from every(value, f"{prefix}{field.name}.")
+        else:
+            yield prefix + field.name, registers, field, value
 
 
 def members(registers: Registers) -> Iterator[tuple[Field, Any]]:
@@ -105,14 +120,12 @@ def outside_ranges(params: Registers) -> Iterator[tuple[str, float, tuple[float,
             yield path, value, claimed
 
 
-def ranged(registers: Registers, prefix: str = "") -> Iterator[tuple[str, float, tuple[float, float]]]:
+def ranged(registers: Registers) -> Iterator[tuple[str, float, tuple[float, float]]]:
     """Every value of which a range is declared: path, value, range."""
-    for field, value in members(registers):
-        if field.block is not None:
-            yield from ranged(value, f"{prefix}{field.name}.")
-        elif field.range is not None:
+    for path, _, field, value in every(registers):
+        if field.range is not None:
             for k, one in enumerate(value if field.length else [value]):
-                yield f"{prefix}{field.name}" + (f"[{k}]" if field.length else ""), one, field.range
+                yield path + (f"[{k}]" if field.length else ""), one, field.range
 
 
 def unit_of(axis: Axis, prefix: str = "", motor: str = "") -> ControlUnit:

@@ -150,7 +150,8 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
         strict = f"{target.compiler} {FLAGS} {level} {target.flags} {WARNINGS} {graph} -Werror -I{source} -c"
         told = _run([*strict.split(), str(source / f"{name}.c"), "-o", "unit.o"], work)
         compiling = f"{target.compiler} {FLAGS} {level} {target.flags} -DSHARE={target.share} -I{source} -c".split()
-        files = {f"{part}.o": (f"{name}_{part}.c", "") for part in ("params", "image", "replay", "drawn")}
+        files = {f"{part}.o": (f"{name}_{part}.c", "") for part in ("params", "tables", "image", "replay", "drawn")
+                 if (source / f"{name}_{part}.c").is_file()}  # fmt: skip
         files |= {f"board_{kind}.o": ("board.c", f"vectors/{kind}.vec") for kind in ("job", "drawn")}
         for made_file, (file, vectors) in files.items():
             more = [f'-DVECTORS="{source / vectors}"'] if vectors else []
@@ -158,7 +159,8 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
         # The program of the random vectors holds the unit's own text, and sees its inner functions.
         programs = {"job": ("unit", "replay"), "drawn": ("drawn",)}
         for program, parts in programs.items():
-            objects = [f"{part}.o" for part in (*parts, "params", "image", f"board_{program}")]
+            tables = ["tables"] if "tables.o" in files else []
+            objects = [f"{part}.o" for part in (*parts, *tables, "params", "image", f"board_{program}")]
             told = told or _run(_linking(work, target, level, program, objects), work)
         if told:
             return Proof(target.name, level, equal=False, told=f"does not compile: {told}")
