@@ -12,11 +12,13 @@ from detent.cli.terminal import print_json, progress_bar, say, split_names, tell
 OUTPUT = "Folder for the export: a new one, an empty one, or that of an earlier export."
 MOTOR = "Which motor, of a file that has several."
 PREFIX = "Prefix of all names in C. Default: from the name of the motor or the axis."
+TARGET = "What it is for: host, cortex-m0, cortex-m4, cortex-m7, rv32 or avr. The C is the same for all."
 TICKS = "Ticks of the golden run at most."
 FILES = "Random register files that each function is called on."
 ROUNDS = "Ticks in which the host does anything and the lines show anything."
 ON = (
-    "Where to replay, comma-separated: host-gcc, host-clang, cortex-m0, cortex-m4, cortex-m7, rv32. Default: all there."
+    "Where to replay, comma-separated: host-gcc, host-clang, cortex-m0, cortex-m4, cortex-m7, rv32, avr. "
+    "Default: all there."
 )
 MUTANTS = "Change one thing of the C at so many places, one at a time, and tell which changes no vector finds."
 BAR = "Tell what the vectors do not reach; fail where they take fewer of the branch outcomes [%]."
@@ -39,6 +41,7 @@ def firmware(
     job: Job = None,
     motor: Annotated[str, option("--axis", "NAME", MOTOR)] = "",
     prefix: Annotated[str, option("--prefix", "NAME", PREFIX)] = "",
+    target: Annotated[str, option("--target", "NAME", TARGET)] = "host",
     ticks: Annotated[int, option("--ticks", "NUMBER", TICKS)] = 1_000_000,
     files: Annotated[int, option("--files", "NUMBER", FILES)] = 1000,
     rounds: Annotated[int, option("--rounds", "NUMBER", ROUNDS)] = 1_000_000,
@@ -57,7 +60,7 @@ def firmware(
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "simulating the job, translating the controller")
         made = export_firmware(
-            axis, output, job=job, motor=motor, prefix=prefix, ticks=ticks, files=files, rounds=rounds
+            axis, output, job=job, motor=motor, prefix=prefix, target=target, ticks=ticks, files=files, rounds=rounds
         )
     found: dict[str, Any] = dict(made.manifest)
     if as_json:
@@ -122,7 +125,7 @@ def verify(
         proofs = proving.verify(folder, split_names(on), progress)
         reach = teeth.reach(folder) if coverage_bar is not None else None
         changed = teeth.mutants(folder, mutants, progress) if mutants else []
-    left_out = {} if on else {one.name: one.missing for one in proving.TARGETS.values() if one.missing}
+    left_out = {} if on else proving.left_out(folder)
     done = bool(proofs) and all(one.equal for one in proofs) and not other
     done = done and (reach is None or reach.share >= (coverage_bar or 0.0))
     if as_json:
@@ -150,7 +153,7 @@ def verify(
         for text in other:
             say(text, wrong=True)
         for name, tools in left_out.items():
-            tell(f"{name:<11} not run: needs {tools}")
+            tell(f"{name:<11} not run: {tools}")
         if not proofs:
             say("nothing was run: no compiler is installed", wrong=True)
     if not done:

@@ -22,6 +22,12 @@ from detent.export.vectors import Golden
 from detent.kernel.registers import Field, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
 
 FLAGS = "-std=c99 -ffp-contract=off"
+PROCESSORS = {
+    "host": "", "cortex-m0": "-mthumb -mcpu=cortex-m0", "cortex-m4": "-mthumb -mcpu=cortex-m4",
+    "cortex-m7": "-mthumb -mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard", "rv32": "-march=rv32imac -mabi=ilp32",
+    "avr": "-mmcu=atmega2560",
+}  # fmt: skip
+"""What an export can be for, and what its compiler must be told; the C is the same for all."""
 WARNINGS = (
     "-Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wundef -Wcast-qual -Wstrict-prototypes "
     "-Wmissing-prototypes -Wdouble-promotion -Wswitch-default -Wimplicit-fallthrough"
@@ -204,7 +210,9 @@ def range_checks(program: Program, params: Registers) -> Iterator[dict[str, Any]
             yield {"text": " && ".join(parts), "number": row.number + 1, "length": row.length}
 
 
-def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick: str) -> dict[str, str]:
+def texts(  # noqa: PLR0913 - what the files tell of
+    unit: ControlUnit, program: Program, golden: Golden, about: str, tick: str, target: str
+) -> dict[str, str]:
     """All texts of an export by the names of their files, but for what tells of these files."""
     name, params = unit.name, golden.params
     source_hash = short_hash(*(f.source.encode() for f in program.order))
@@ -258,7 +266,8 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
     made["registers.csv"] = table(registers(unit))
     made["trace.csv"] = table(traced(program, made[f"{name}.c"]))
     sources = [f"{name}{part}.c" for part in ("", "_params", "_tables") if f"{name}{part}.c" in made]
-    made["build.mk"] = f"{name}_CFLAGS := {FLAGS}\n{name}_SOURCES := {' '.join(sources)}\n"
+    flags = f"{FLAGS} {PROCESSORS[target]}".strip()
+    made["build.mk"] = f"{name}_CFLAGS := {flags}\n{name}_SOURCES := {' '.join(sources)}\n"
     return made
 
 

@@ -122,7 +122,8 @@ class Chance:
     def __init__(self, unit: ControlUnit, program: Program, params: Registers) -> None:
         self.unit, self.program, self.given = unit, program, params
         self.files: dict[str, Any] = {"p": params.copy(), "c": unit.controller(), "l": unit.lines()}
-        drawn = {root: list(rows_of(one, root, program.options.keys() | program.shape.tables.keys())) for root, one in self.files.items()}
+        elsewhere = program.options.keys() | program.shape.tables.keys()
+        drawn = {root: list(rows_of(one, root, elsewhere)) for root, one in self.files.items()}
         self.rows = {root: [row for row, _ in found] for root, found in drawn.items()}
         self.wires = [row for row, by in drawn["l"] if by == PLANT and row.length <= LARGE]
         self._arrays = {root: arrays(rows) for root, rows in self.rows.items()}

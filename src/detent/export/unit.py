@@ -19,6 +19,7 @@ from detent.kernel.loop import control_of
 from detent.kernel.registers import Field, Leaf, Registers, Width
 from detent.methods.registry import METHODS
 
+NARROW = ("avr",)  # targets whose double is not IEEE binary64
 LARGE = 64  # elements of an array that enters the hash of every 1000th tick only if it has more
 
 
@@ -78,6 +79,14 @@ def arguments(step: Callable[..., Any], roots: Mapping[type[Registers], str]) ->
             yield {float: "f8", bool: "u1"}.get(hint, "i8")
 
 
+def signal_widths(step: Callable[..., Any]) -> Iterator[Width]:
+    """Widths of the elements of what a host lays ready for a step."""
+    for hint in inspect.get_annotations(getattr(step, "py_func", step), eval_str=True).values():
+        width = next((one for one in get_args(hint)[1:] if isinstance(one, Width)), None)
+        if width is not None and get_args(hint)[0] is Any:
+            yield width
+
+
 def options_of(params: Registers) -> dict[tuple[type[Registers], str], float]:
     """Values of the parameters that choose a variant, where their class has one value wherever it occurs."""
     found: dict[tuple[type[Registers], str], set[float]] = {}
@@ -111,6 +120,17 @@ def members(registers: Registers) -> Iterator[tuple[Field, Any]]:
     """Every field of a register file with what stands in it."""
     for field in type(registers).__fields__.values():
         yield field, getattr(registers, field.name)
+
+
+def refuse_floats(unit: ControlUnit, target: str) -> None:
+    """Refuse a unit with floats for a processor whose `double` has 32 bits (FW05)."""
+    roots = {"params": unit.params, "controller": unit.controller, "lines": unit.lines}
+    for root, registers in roots.items() if target in NARROW else ():
+        for leaf in registers.leaves():
+            if leaf.width.is_float:
+                got = f"{root}.{leaf.path}, a number of 64 bits, for {target}, whose double has 32"
+                expected = "a controller of whole numbers"
+                raise RefusedError("FW05", None, got, expected, "a variant in whole numbers, or another --target")
 
 
 def outside_ranges(params: Registers) -> Iterator[tuple[str, float, tuple[float, float]]]:

@@ -170,7 +170,7 @@ class Program:
     classes of registers that are not those of the classes. All names begin with `name`.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what is translated, and what of it is other in C
         self,
         name: str,
         entries: Mapping[str, Callable[..., Any]],
@@ -226,8 +226,10 @@ class Program:
         if table is not None:
             return array_of(table, "signal")
         eight = value.width is not None and value.width.size == 8
-        read = "{text}.at[{index}]" if eight or value.width is None else (
-            f"{self.name.upper()}_{value.width.code.upper()}({{text}}.at, {{index}})"
+        read = (
+            "{text}.at[{index}]"
+            if eight or value.width is None
+            else (f"{self.name.upper()}_{value.width.code.upper()}({{text}}.at, {{index}})")
         )
         return replace(value, element=read)
 

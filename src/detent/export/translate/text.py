@@ -78,7 +78,6 @@ WHOLE_HELPERS = {
     return bits;
 }
 """,
-
 }
 WRAP = """{t} N(wrap_{c})(int64_t value)
 {{
@@ -145,7 +144,8 @@ def helpers_text(program: Program) -> str:
     """All helpers that a program needs, the ones that others call first."""
     needed = program.notes.helpers | ({"to_i64"} if "floor" in program.notes.helpers else set[str]())
     storage = program.shape.storage or "static "
-    return "\n".join(helper_text(one, program.name, storage) for one in sorted(needed, key=lambda one: (one == "floor", one)))
+    order = sorted(needed, key=lambda one: (one == "floor", one))
+    return "\n".join(helper_text(one, program.name, storage) for one in order)
 
 
 def comment_of(text: str) -> str:
@@ -181,10 +181,8 @@ def struct_texts(program: Program, files: Iterable[type[Registers]]) -> str:
 
 def signals_text(program: Program) -> str:
     """Types of what a host lays ready."""
-    widths = sorted(
-        {v.width for f in program.order for v in f.names.values() if v and v.kind == "signal" and v.width and not v.length},
-        key=lambda one: one.code,
-    )
+    laid = [v for f in program.order for v in f.names.values() if v and v.kind == "signal" and not v.length]
+    widths = sorted({v.width for v in laid if v.width}, key=lambda one: one.code)
     kept = {t.width for t in program.shape.tables.values()} | {one for one in widths if one.size < 8}
     parts = [FLASH.format(NAME=program.name.upper())] if kept else []
     parts += [READS.format(NAME=program.name.upper(), CODE=one.code.upper(), type=one.c_name, bytes=one.size,
