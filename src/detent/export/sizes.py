@@ -134,13 +134,8 @@ def sizes_of(tools: str, work: Path, entries: Iterable[str], program: str = "", 
     }
     if not sections:
         return Sizes()
-    symbols = {
-        words[3]: int(words[1], 16)
-        for part in ("params.o", "replay.o", "tables.o")
-        if (work / part).is_file()
-        for words in (line.split() for line in _told([f"{tools}nm", "-S", part], work).splitlines())
-        if len(words) == 4
-    }
+    symbols = _symbols(tools, "params.o", work) | _symbols(tools, "replay.o", work)
+    apart = sum(_symbols(tools, "tables.o", work).values())
     needed = [line.split()[-1] for line in _told([f"{tools}nm", "-u", "unit.o"], work).splitlines()]
     told = _told([f"{tools}readelf", "-sW", program], work) if program else ""
     data = {words[7] for words in (line.split() for line in told.splitlines()) if words[3:4] == ["OBJECT"]}

@@ -203,7 +203,7 @@ def compile_parts(  # noqa: PLR0913 - what, for which processor, and where
     if not target.share:
         del programs["drawn"]
         parts.remove("drawn")
-    files = {f"{part}.o": (source / f"{name}_{part}.c", []) for part in parts}
+    files = {f"{part}.o": (source / f"{name}_{part}.c", list[str]()) for part in parts}
     files |= {f"board_{kind}.o": (source / "board.c", [f'-DVECTORS="{file}"']) for kind, file in programs.items()}
     told = ""
     for made, (file, given) in files.items():

@@ -334,11 +334,10 @@ class Statements(Calls):
             return
         if isinstance(target, ast.Attribute):
             base = self.expr(target.value)
-            fields = base.registers.__fields__ if base.registers else {}
-            field = fields.get(target.attr)
-            if field is None or field.width is None or field.length:
-                raise outside_language(target, f"a store to {ast.unparse(target)}", "store to single registers")
             written = base.registers
+            field = written.__fields__.get(target.attr) if written else None
+            if written is None or field is None or field.width is None or field.length:
+                raise outside_language(target, f"a store to {ast.unparse(target)}", "store to single registers")
             if self._is_settled(target, written, value):
                 return
             place = self.member(base, target.attr)
