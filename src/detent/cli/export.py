@@ -13,6 +13,7 @@ from detent.errors import DetentError
 OUTPUT = "Folder for the export: a new one, an empty one, or that of an earlier export."
 MOTOR = "Which motor, of a file that has several."
 PREFIX = "Prefix of all names in C. Default: from the name of the motor or the axis."
+TARGET = "What it is for: host, cortex-m0, cortex-m4, cortex-m7, rv32 or avr. The C is the same for all."
 TICKS = "Ticks of the golden run at most."
 FILES = "Random register files that each function is called on."
 ROUNDS = "Ticks in which the host does anything and the lines show anything."
@@ -21,7 +22,8 @@ FIXED = "Parameters that become constants of the code, comma-separated, * for an
 CLOCK = "Clock of a processor, for the share of a tick that the controller takes: 72MHz."
 PRINT = "Show a file of vectors as text: vectors/job.vec, vectors/drawn.vec. Nothing is compiled."
 ON = (
-    "Where to replay, comma-separated: host-gcc, host-clang, cortex-m0, cortex-m4, cortex-m7, rv32. Default: all there."
+    "Where to replay, comma-separated: host-gcc, host-clang, cortex-m0, cortex-m4, cortex-m7, rv32, avr. "
+    "Default: all there."
 )
 MUTANTS = "Change one thing of the C at so many places, one at a time, and tell which changes no vector finds."
 BAR = "Tell what the vectors do not reach; fail where they take fewer of the branch outcomes [%]."
@@ -45,6 +47,7 @@ def firmware(
     job: Job = None,
     motor: Annotated[str, option("--axis", "NAME", MOTOR)] = "",
     prefix: Annotated[str, option("--prefix", "NAME", PREFIX)] = "",
+    target: Annotated[str, option("--target", "NAME", TARGET)] = "host",
     ticks: Annotated[int, option("--ticks", "NUMBER", TICKS)] = 1_000_000,
     files: Annotated[int, option("--files", "NUMBER", FILES)] = 1000,
     rounds: Annotated[int, option("--rounds", "NUMBER", ROUNDS)] = 1_000_000,
@@ -65,7 +68,7 @@ def firmware(
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "simulating the job, translating the controller")
         made = export_firmware(
-            axis, output, job=job, motor=motor, prefix=prefix, ticks=ticks, files=files, rounds=rounds,
+            axis, output, job=job, motor=motor, prefix=prefix, target=target, ticks=ticks, files=files, rounds=rounds,
             tunable=split_names(tunable), fixed=split_names(fixed),
         )  # fmt: skip
     found: dict[str, Any] = dict(made.manifest)
@@ -149,7 +152,7 @@ def verify(
             measuring.measure(folder, chosen, frequency, progress),
             teeth.reach(folder) if coverage_bar is not None else None, coverage_bar or 0.0,
             teeth.mutants(folder, mutants, progress) if mutants else [],
-            {} if on else {one.name: one.missing for one in proving.TARGETS.values() if one.missing},
+            {} if on else proving.left_out(folder),
         )  # fmt: skip
     measuring.note(folder, **found.kept(), clock=clock)
     if as_json:

@@ -7,13 +7,16 @@ differs is the column error. Positions in 1/256 emitter from the left frame, tim
 """
 
 from detent.kernel.registers import Registers, i4, i4_array, i8, register, u1, u1_array
-from detent.kernel.step import bounded, hot_step, step
+from detent.kernel.step import hot_step, step
 
 COLUMNS = 2048
 """Columns of the line buffer: 17 in at 120 per inch."""
 
 HALF_EMITTER = 128
 """How far left of its count an emitter begins [1/256 emitter]."""
+
+AHEAD = 16
+"""Columns looked at on an emitter at most, so that no interrupt takes long; the head passes 0.4 of one meanwhile."""
 
 NEVER = 1 << 62
 
@@ -49,25 +52,12 @@ class ColumnTimer(Registers):
 
 
 @step
-@bounded(COLUMNS, "passes a column per turn")
-def skip_white(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
-    """Advance to the next inked column; the line is done when there is none."""
-    base = r.bank * COLUMNS
-    while r.active and b.ink[base + r.column] == 0:
-        if r.column == r.end_column:
-            r.active = 0
-        else:
-            r.column += direction
-
-
-@step
-def start_line(r: ColumnTimer, b: LineBuffer, first: int, last: int, direction: int) -> None:
+def start_line(r: ColumnTimer, first: int, last: int, direction: int) -> None:
     """Begin a line whose printable interval runs from column `first` to `last` in the direction of motion."""
     r.column = min(max(first, 0), COLUMNS - 1)
     r.end_column = min(max(last, 0), COLUMNS - 1)
     r.active = 1 if (last - first) * direction >= 0 else 0
     r.fire_us = NEVER
-    skip_white(r, b, direction)
 
 
 @step
@@ -77,39 +67,40 @@ def set_lead(p: ColumnTimerParams, r: ColumnTimer, s: int) -> None:
 
 
 @step
-def next_column(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
-    """The present column is done."""
+def next_column(r: ColumnTimer) -> None:
+    """The present column is done; the line is, behind its last one."""
     r.fire_us = NEVER
     if r.column == r.end_column:
         r.active = 0
     else:
-        r.column += direction
-        skip_white(r, b, direction)
+        r.column += 1 if r.column < r.end_column else -1
 
 
 @hot_step
-@bounded(COLUMNS, "passes a column per turn, but for the last one")
 def schedule(
     p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, emitter: int, direction: int, now: int, interval: int
 ) -> None:
-    """On an emitter: set the firing time of the next column if it lies before the next emitter.
+    """On an emitter: set the firing time of the next inked column if it lies before the next emitter.
 
     A column found behind the head (its time passed while the interval was still unknown) is counted as missed.
     """
-    while r.active and r.fire_us == NEVER:
-        edge = emitter * 256 - HALF_EMITTER
-        ahead = (p.column_zero + r.column * p.column_pitch - edge) * direction - r.lead
-        if ahead >= 256:
-            break
-        if ahead < 0 or interval <= 0:
+    edge = emitter * 256 - HALF_EMITTER
+    for _ in range(AHEAD):
+        if not r.active or r.fire_us != NEVER:
+            return
+        if b.ink[r.bank * COLUMNS + r.column]:
+            ahead = (p.column_zero + r.column * p.column_pitch - edge) * direction - r.lead
+            if ahead >= 256:
+                return
+            if ahead >= 0 and interval > 0:
+                r.fire_us = now + ((ahead * interval + 128) >> 8)
+                return
             r.missed += 1
-            next_column(r, b, direction)
-        else:
-            r.fire_us = now + ((ahead * interval + 128) >> 8)
+        next_column(r)
 
 
 @step
-def fired(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
+def fired(r: ColumnTimer) -> None:
     """The due column has been fired."""
     r.fired += 1
-    next_column(r, b, direction)
+    next_column(r)

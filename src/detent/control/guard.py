@@ -67,14 +67,20 @@ class Guard(Registers):
     push: i1 = register("direction of that effort")
     began: i8 = register("movement in the first sample of the window", unit="count")
     awaited: i8 = register("ticks or samples in which the axis must still arrive; 0: none waits", unit="count")
-    effort: f8 = register("effort since the last sample, where it is weighed", unit="V")
-    moved: i8 = register("movement up to the last sample, where the effort is weighed", unit="count")
+    proven: u1 = register("1 once an effort has sped the axis up in its own direction: the sensor counts right")
+    driven: u1 = register("1 while the weighed effort holds back what a force from outside drives")
+    conduct: Conduct = block("how the axis has behaved")
+
+
+class Weighing(Registers):
+    """What the effort makes of a motion against it: of a controller that weighs its effort."""
+
+    effort: f8 = register("effort since the last sample", unit="V")
+    moved: i8 = register("movement up to the last sample", unit="count")
     against: i4 = register("samples of motion against the effort", unit="count")
     first: i8 = register("speed against it in the sample before them", unit="count")
     efforts: f8 = register("sum of the effort over them", unit="V")
     answer: f8 = register("sum of the effort times what the speed against it grew by", unit="V.count")
-    proven: u1 = register("1 once a weighed effort has sped the axis up in its own direction: the sensor counts right")
-    conduct: Conduct = block("how the axis has behaved")
 
 
 @step
@@ -104,9 +110,15 @@ def enable_guard(g: Guard) -> None:
     """Forget the last fault and what led to it: the axis is enabled."""
     g.code = g.hard = g.side = g.push = g.pushed = 0
     g.following = g.saturated = g.stuck = g.fast = g.jumps = 0
-    g.awaited = g.moved = g.against = g.proven = 0
+    g.awaited = g.proven = g.driven = 0
     g.fresh, g.beyond = 1, 0
-    g.effort = 0.0
+
+
+@step
+def begin_weighing(w: Weighing) -> None:
+    """Forget what the effort has done: the axis is enabled."""
+    w.moved = w.against = 0
+    w.effort = 0.0
 
 
 @step
@@ -133,29 +145,30 @@ def trip(p: GuardParams, g: Guard, code: int) -> None:
 
 
 @hot_step
-def weigh_effort(g: Guard, effort: float, moved: int) -> None:
+def weigh_effort(w: Weighing, g: Guard, effort: float, moved: int) -> None:
     """Note what the effort since the last sample has made of a motion against it; from now on it is `effort` [V]."""
-    if moved == 0 or moved * g.moved < 0 or moved * g.effort > 0.0:
-        g.against = 0
+    if moved == 0 or moved * w.moved < 0 or moved * w.effort > 0.0:
+        w.against = 0
     else:
-        speed, before = abs(moved), abs(g.moved)
-        if g.against == 0:
-            g.first, g.efforts, g.answer = before, 0.0, 0.0
-        g.against += 1
-        g.efforts += abs(g.effort)
-        g.answer += abs(g.effort) * (speed - before)
-    g.effort, g.moved = effort, moved
+        speed, before = abs(moved), abs(w.moved)
+        if w.against == 0:
+            w.first, w.efforts, w.answer = before, 0.0, 0.0
+        w.against += 1
+        w.efforts += abs(w.effort)
+        w.answer += abs(w.effort) * (speed - before)
+    w.effort, w.moved = effort, moved
+    g.driven = g.proven > 0 or is_held_back(w, moved)
 
 
 @step
-def is_driven(g: Guard, moved: int) -> bool:
-    """True when the weighed effort holds the axis back, or has moved it as it should: a force from outside drives it.
+def is_held_back(w: Weighing, moved: int) -> bool:
+    """True when the effort holds the axis back: a force from outside drives it.
 
     With u the effort, a what the speed against it grows by in a sample, and means over the motion against it, the sum
     of (u / mean(u) - 1) a is above 0 if the axis speeds up by its effort, and below if it does so in spite of it. The
     sensor rounds a speed by up to one count, so that much is doubt.
     """
-    return g.proven > 0 or g.answer * g.against < g.efforts * (abs(moved) - g.first - 1)
+    return w.answer * w.against < w.efforts * (abs(moved) - w.first - 1)
 
 
 @step
@@ -172,9 +185,9 @@ def watch_effort(p: GuardParams, g: Guard, pushing: int, moved: int) -> None:
     g.pushed += 1
     if 0 < p.reversed <= g.pushed:
         gained = pushing * (moved - g.began)
-        if pushing * moved < 0 and gained < -1 and not is_driven(g, moved):
+        if pushing * moved < 0 and gained < -1 and not g.driven:
             trip(p, g, REVERSED)
-        if pushing * moved > 0 and gained > 1 and g.effort != 0.0:
+        if pushing * moved > 0 and gained > 1:
             g.proven = 1
         g.pushed = 0
 

@@ -19,7 +19,7 @@ from detent.control.head_computer import (
     is_motion,
 )
 from detent.control.head_motion import forget_drive
-from detent.control.latch import read_latch, send
+from detent.control.latch import ROOM, read_latch, send
 from detent.control.speed_selection import FLOOR, HALVINGS, fits, select_speed, slower
 from detent.kernel.step import bounded, step
 
@@ -82,8 +82,9 @@ def take_next(c: HeadComputer) -> None:
 def answer(c: HeadComputer, code: int) -> None:
     """Answer the running command, which may be several refused ones."""
     times = 1 + c.end if c.operation == REFUSED else 1
-    for _ in range(times):
+    for _ in range(min(times, ROOM)):
         send(c.status, code)
+    c.status.lost += max(times - ROOM, 0)
 
 
 @step

@@ -145,7 +145,7 @@ def begin_line(p: HeadParams, c: HeadComputer, turn: bool) -> None:
     c.buffer.direction[c.columns.bank] = c.direction
     c.buffer.turned[c.columns.bank] = 1 if turn else 0
     set_lead(p.columns, c.columns, c.speed)
-    start_line(c.columns, c.buffer, first, last, c.direction)
+    start_line(c.columns, first, last, c.direction)
 
 
 @step

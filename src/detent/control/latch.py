@@ -4,6 +4,7 @@ from detent.kernel.registers import Registers, block, register, u1, u1_array
 from detent.kernel.step import step
 
 QUEUE_LENGTH = 32  # status bytes that can wait; a power of two
+ROOM = QUEUE_LENGTH + 1  # and the latch itself: of more at once the rest is lost
 
 
 class Latch(Registers):

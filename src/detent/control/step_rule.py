@@ -24,7 +24,9 @@ LIMITS = 16
 class StepRuleParams(Registers):
     """Ramp list, zone limits and what an entry of the table consists of."""
 
-    ramp: i4_array = register("word of each ramp index: frequency [Hz] or period [tick]", unit="count", length=RAMP)
+    ramp: i4_array = register(
+        "word of each ramp index: frequency [Hz] or period [tick]", unit="count", length=RAMP, table=True
+    )
     limit: i4_array = register("word of each zone limit: frequency [Hz] or period [tick]", unit="count", length=LIMITS)
     index_mask: i4 = register("bits of an entry that hold the ramp index", unit="code", range=(0, RAMP - 1))
     zone_shift: u1 = register("place of the zone number in an entry", unit="bit", range=(11, 15))
@@ -167,7 +169,7 @@ def next_entry(r: StepRule, up: i2_signal, down: i2_signal) -> int:
     if not (0 <= r.position < len(up) and r.position < len(down)):
         return OUTSIDE
     direction = r.heading if r.index < 0 else r.direction
-    return int(up[r.position]) if direction > 0 else int(down[r.position])
+    return int((up if direction > 0 else down)[r.position])
 
 
 @hot_step
@@ -215,11 +217,13 @@ def deflect(p: StepRuleParams, r: StepRule, word: int, last: int, heading: int) 
     r.manual, r.heading, r.event = 1, heading, 0
     r.request_word = word
     # The first index that is fast enough; of several with this very word the last, which the motor passes them to.
-    below = same = 0
+    wanted = 0
     for k in range(last + 1):
-        below += compare_words(p, p.ramp[k], word) < 0
-        same += p.ramp[k] == word
-    r.request = AT_REST if word == 0 else min(below + max(same - 1, 0), last)
+        if compare_words(p, p.ramp[k], word) < 0:
+            wanted = min(k + 1, last)
+        elif p.ramp[k] == word:
+            wanted = k
+    r.request = AT_REST if word == 0 else wanted
 
 
 @step

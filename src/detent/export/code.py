@@ -17,11 +17,17 @@ from detent.export.drawn import FAR, PLACES, SEED, Chance, Row, drawn_from
 from detent.export.translate.program import Function, Program
 from detent.export.translate.text import code_text, comment_of, signals_text, struct_texts
 from detent.export.translate.values import Value, c_field, interval_of, number, type_of_local
-from detent.export.unit import LARGE, ControlUnit, members
+from detent.export.unit import LARGE, ControlUnit, every, members
 from detent.export.vectors import Golden
 from detent.kernel.registers import Field, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
 
 FLAGS = "-std=c99 -ffp-contract=off"
+PROCESSORS = {
+    "host": "", "cortex-m0": "-mthumb -mcpu=cortex-m0", "cortex-m4": "-mthumb -mcpu=cortex-m4",
+    "cortex-m7": "-mthumb -mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard", "rv32": "-march=rv32imac -mabi=ilp32",
+    "avr": "-mmcu=atmega2560",
+}  # fmt: skip
+"""What an export can be for, and what its compiler must be told; the C is the same for all."""
 WARNINGS = (
     "-Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wundef -Wcast-qual -Wstrict-prototypes "
     "-Wmissing-prototypes -Wdouble-promotion -Wswitch-default -Wimplicit-fallthrough"
@@ -95,13 +101,17 @@ class Parameter:
 def parameters(program: Program, params: Registers) -> Iterator[Parameter]:
     """Every parameter, in the order of declaration."""
     for count, (prefix, registers, field, width) in enumerate(_fields(params, "")):
-        folded, word = (type(registers), field.name) in program.options, "an option" if field.option else "by --fixed"
+        place = (type(registers), field.name)
+        folded, word = place in program.options, "an option" if field.option else "by --fixed"
+        is_table = place in program.shape.tables
         value = getattr(registers, field.name)
         default = f"{len(value)} values" if field.length else repr(value)
         yield Parameter(
-            count, prefix + field.name, "" if folded else place_of(f"p.{prefix}{field.name}", parameters="p->"),
+            count, prefix + field.name,
+            "" if folded or is_table else place_of(f"p.{prefix}{field.name}", parameters="p->"),
             width.code, field.length, field.unit, range_text(field.range), default,
-            f"{word}, folded into the code" if folded else "yes", field.doc,
+            f"{word}, folded into the code" if folded else "a table among the constants" if is_table else "yes",
+            field.doc,
         )  # fmt: skip
 
 
@@ -201,7 +211,9 @@ def range_checks(program: Program, params: Registers) -> Iterator[dict[str, Any]
             yield {"text": " && ".join(parts), "number": row.number + 1, "length": row.length}
 
 
-def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick: str) -> dict[str, str]:
+def texts(  # noqa: PLR0913 - what the files tell of
+    unit: ControlUnit, program: Program, golden: Golden, about: str, tick: str, target: str
+) -> dict[str, str]:
     """All texts of an export by the names of their files, but for what tells of these files."""
     name, params = unit.name, golden.params
     source_hash = short_hash(*(f.source.encode() for f in program.order))
@@ -234,6 +246,10 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
         "code": code, "checks": list(range_checks(program, params)), "floats": floats, "images": list(images.items()),
     }  # fmt: skip
     made = {f"{name}.h": template("unit.h.in", **given), f"{name}.c": template("unit.c.in", **given)}
+    if program.shape.tables:
+        values = {one: getattr(registers, field.name) for _, registers, field, _ in every(params)
+                  for one in [program.shape.tables.get((type(registers), field.name))] if one}  # fmt: skip
+        made[f"{name}_tables.c"] = template("tables.c.in", name=name, NAME=name.upper(), tables=list(values.items()))
     made[f"{name}_image.c"] = template("image.c.in", **given)
     initialiser = _initialiser(program, params)
     text = template("params.c.in", name=name, initialiser=initialiser)
@@ -254,7 +270,9 @@ def texts(unit: ControlUnit, program: Program, golden: Golden, about: str, tick:
     made["params.csv"] = table(parameters(program, params))
     made["registers.csv"] = table(registers(unit))
     made["trace.csv"] = table(traced(program, made[f"{name}.c"]))
-    made["build.mk"] = f"{name}_CFLAGS := {FLAGS}\n{name}_SOURCES := {name}.c {name}_params.c\n"
+    sources = [f"{name}{part}.c" for part in ("", "_params", "_tables") if f"{name}{part}.c" in made]
+    flags = f"{FLAGS} {PROCESSORS[target]}".strip()
+    made["build.mk"] = f"{name}_CFLAGS := {flags}\n{name}_SOURCES := {' '.join(sources)}\n"
     return made
 
 
@@ -284,7 +302,7 @@ def _row_in_c(row: Row) -> dict[str, Any]:
 def _call_in_c(chance: Chance, f: Function) -> list[str]:
     """Statements that draw the arguments of a function, call it, and return the bits of its result."""
     program, lines, told, signals = chance.program, list[str](), list[str](), 0
-    for k, name in enumerate(f.parameters):
+    for k, name in enumerate(program.arguments(f)):
         value: Any = f.names[name]
         if value.kind == "file":
             kind = ("const " if value.registers in program.fixed else "") + program.struct(value.registers)
@@ -308,7 +326,7 @@ def _call_in_c(chance: Chance, f: Function) -> list[str]:
             lines.append(f"const {kind} a{k} = ({kind})draw_whole({least}, {most}, {count});")
             told.append(f"(uint64_t)a{k}")
     lines += [f"told_[{k}] = {one};" for k, one in enumerate(told)] + [f"arguments_ = {len(told)};"]
-    call = f"{f.cname}({', '.join(f'a{k}' for k in range(len(f.parameters)))})"
+    call = f"{f.cname}({', '.join(f'a{k}' for k in range(len(program.arguments(f))))})"
     forms = {"int": "return (uint64_t){};", "bool": "return {} ? 1u : 0u;", "float": "return real_bits({});"}
     return [*lines, *forms.get(f.result_kind, "(void){};\nreturn 0;").format(call).splitlines()]
 
@@ -329,7 +347,7 @@ def drawn_text(chance: Chance) -> str:
         for one in sorted((one for one in widths if one), key=lambda one: one.code)
     ]
     roots = {chance.unit.params: "&p_", chance.unit.controller: "&c_", chance.unit.lines: "&l_"}
-    values: list[Any] = [chance.tick.names[one] for one in chance.tick.parameters]
+    values: list[Any] = [chance.tick.names[one] for one in program.arguments(chance.tick)]
     given = [roots[value.registers] for value in values if value.kind == "file"]
     given += [f"feed{k}_" for k in range(len(feed))]
     functions = [{"name": f.cname, "lines": _call_in_c(chance, f)} for f in program.order]

@@ -122,15 +122,15 @@ class Chance:
     def __init__(self, unit: ControlUnit, program: Program, params: Registers) -> None:
         self.unit, self.program, self.given = unit, program, params
         self.files: dict[str, Any] = {"p": params.copy(), "c": unit.controller(), "l": unit.lines()}
-        drawn = {root: list(rows_of(one, root, program.options)) for root, one in self.files.items()}
+        elsewhere = program.options.keys() | program.shape.tables.keys()
+        drawn = {root: list(rows_of(one, root, elsewhere)) for root, one in self.files.items()}
         self.rows = {root: [row for row, _ in found] for root, found in drawn.items()}
         self.wires = [row for row, by in drawn["l"] if by == PLANT and row.length <= LARGE]
         self._arrays = {root: arrays(rows) for root, rows in self.rows.items()}
         self.places: dict[type[Registers], list[tuple[str, str]]] = {}
         for cls, root in ((unit.params, "p"), (unit.controller, "c"), (unit.lines, "l")):
             for one, at, path in blocks_in(cls, root):
-                if not program.is_folded(one):
-                    self.places.setdefault(one, []).append((at, path))
+                self.places.setdefault(one, []).append((at, path))
         self.actions = [program.steps[_plain(one)] for one in list(unit.entries.values())[1:]]
         tick = program.steps[_plain(next(iter(unit.entries.values())))]
         self.tick = tick
@@ -171,7 +171,8 @@ class Chance:
         """One argument, drawn."""
         if value.kind == "file" and value.registers is not None:
             places = self.places[value.registers]
-            root, path = places[draw(self.d) % len(places)]
+            folded = self.program.is_folded(value.registers)  # no part of the C: nothing is drawn for it
+            root, path = places[0 if folded else draw(self.d) % len(places)]
             return attrgetter(path)(self.files[root]) if path else self.files[root]
         if value.kind == "signal":
             return self.lay(value)

@@ -134,12 +134,8 @@ def sizes_of(tools: str, work: Path, entries: Iterable[str], program: str = "", 
     }
     if not sections:
         return Sizes()
-    symbols = {
-        words[3]: int(words[1], 16)
-        for part in ("params.o", "replay.o")
-        for words in (line.split() for line in _told([f"{tools}nm", "-S", part], work).splitlines())
-        if len(words) == 4
-    }
+    symbols = _symbols(tools, "params.o", work) | _symbols(tools, "replay.o", work)
+    apart = sum(_symbols(tools, "tables.o", work).values())
     needed = [line.split()[-1] for line in _told([f"{tools}nm", "-u", "unit.o"], work).splitlines()]
     told = _told([f"{tools}readelf", "-sW", program], work) if program else ""
     data = {words[7] for words in (line.split() for line in told.splitlines()) if words[3:4] == ["OBJECT"]}
@@ -152,9 +148,15 @@ def sizes_of(tools: str, work: Path, entries: Iterable[str], program: str = "", 
 
     return Sizes(
         whole(".text"), whole(".rodata", ".srodata"), whole(".data", ".bss", ".sdata", ".sbss"),
-        defaults - tables if defaults else 0, tables, symbols.get("c_", 0) + symbols.get("l_", 0),
+        defaults - tables if defaults else 0, tables + apart, symbols.get("c_", 0) + symbols.get("l_", 0),
         {one: deepest(one, known) for one in entries if one in known}, reached(needed, known),
     )  # fmt: skip
+
+
+def _symbols(tools: str, part: str, work: Path) -> dict[str, int]:
+    """Bytes of each symbol of an object; none where it is not there."""
+    lines = _told([f"{tools}nm", "-S", part], work).splitlines() if (work / part).is_file() else []
+    return {words[3]: int(words[1], 16) for words in map(str.split, lines) if len(words) == 4}
 
 
 def _told(command: list[str], work: Path) -> str:

@@ -71,9 +71,10 @@ def step_lines(folder: Path, name: str) -> list[tuple[int, int]]:
     return sorted(found)
 
 
-def _programs(name: str) -> dict[str, str]:
+def _programs(folder: Path, name: str) -> dict[str, str]:
     """Sources of the two programs by the vectors that they replay."""
-    rest = f"{name}_params.c {name}_image.c board.c"
+    tables = f"{name}_tables.c" if (folder / f"{name}_tables.c").is_file() else ""
+    rest = f"{name}_params.c {tables} {name}_image.c board.c"
     return {"drawn": f"{name}_drawn.c {rest}", "job": f"{name}.c {name}_replay.c {rest}"}
 
 
@@ -95,7 +96,7 @@ def reach(folder: Path) -> Reach:
     ranges = step_lines(folder, name)
     taken: dict[tuple[int, int], int] = {}
     lines: dict[int, int] = {}
-    for vectors, sources in _programs(name).items():
+    for vectors, sources in _programs(folder, name).items():
         with tempfile.TemporaryDirectory() as made:
             place = _copy(folder, made)
             subprocess.run(  # noqa: S603 - as above; nothing is optimised away
@@ -160,7 +161,7 @@ def mutants(
 
 def _found_by(place: Path, name: str) -> str:
     """The vectors that a changed unit differs in; empty for none."""
-    for vectors, sources in _programs(name).items():
+    for vectors, sources in _programs(place, name).items():
         if _run(f"gcc {HOST} -O1 {sources} -o unit -lm", place).returncode:
             return "compiler"
         try:

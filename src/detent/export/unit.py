@@ -15,11 +15,12 @@ from typing import Any, get_args
 from detent.axis import Axis
 from detent.errors import DetentError
 from detent.export.translate.program import Program
-from detent.export.translate.values import C_WORDS, RefusedError
+from detent.export.translate.values import C_WORDS, RefusedError, Shape, Table
 from detent.kernel.loop import control_of
 from detent.kernel.registers import Field, Leaf, Registers, Width
 from detent.methods.registry import METHODS
 
+NARROW = ("avr",)  # targets whose double is not IEEE binary64
 LARGE = 64  # elements of an array that enters the hash of every 1000th tick only if it has more
 
 
@@ -60,7 +61,8 @@ class ControlUnit:
     def translated(self, params: Registers, tunable: Sequence[str] = (), fixed: Sequence[str] = ()) -> Program:
         """The unit in C, with the options of these parameters folded in but for `tunable`, and `fixed` too."""
         roots = {self.params: "params", self.controller: "controller", self.lines: "lines"}
-        return Program(self.name, self.entries, self.params, folded(params, tunable, fixed), roots)
+        shape = Shape(tables=tables_of(params, self.name))
+        return Program(self.name, self.entries, self.params, folded(params, tunable, fixed), roots, shape)
 
 
 def arguments(step: Callable[..., Any], roots: Mapping[type[Registers], str]) -> Iterator[str]:
@@ -78,18 +80,20 @@ def arguments(step: Callable[..., Any], roots: Mapping[type[Registers], str]) ->
             yield {float: "f8", bool: "u1"}.get(hint, "i8")
 
 
+def signal_widths(step: Callable[..., Any]) -> Iterator[Width]:
+    """Widths of the elements of what a host lays ready for a step."""
+    for hint in inspect.get_annotations(getattr(step, "py_func", step), eval_str=True).values():
+        width = next((one for one in get_args(hint)[1:] if isinstance(one, Width)), None)
+        if width is not None and get_args(hint)[0] is Any:
+            yield width
+
+
 def options_of(params: Registers) -> dict[tuple[type[Registers], str], float]:
     """Values of the parameters that choose a variant, where their class has one value wherever it occurs."""
     found: dict[tuple[type[Registers], str], set[float]] = {}
-
-    def walk(registers: Registers) -> None:
-        for field, value in members(registers):
-            if field.block is not None:
-                walk(value)
-            elif field.option:
-                found.setdefault((type(registers), field.name), set()).add(value)
-
-    walk(params)
+    for _, registers, field, value in every(params):
+        if field.option:
+            found.setdefault((type(registers), field.name), set()).add(value)
     return {place: values.pop() for place, values in found.items() if len(values) == 1}
 
 
@@ -101,15 +105,8 @@ def folded(
     Refused: a pattern that meets none, a table, and a parameter whose class occurs elsewhere with another value.
     """
     found, paths = options_of(params), dict[tuple[type[Registers], str], list[tuple[str, Any, int]]]()
-
-    def walk(registers: Registers, prefix: str) -> None:
-        for field, value in members(registers):
-            if field.block is not None:
-                walk(value, f"{prefix}{field.name}.")
-            else:
-                paths.setdefault((type(registers), field.name), []).append((prefix + field.name, value, field.length))
-
-    walk(params, "")
+    for path, registers, field, value in every(params):
+        paths.setdefault((type(registers), field.name), []).append((path, value, field.length))
     for option, patterns in (("--tunable", tunable), ("--fixed", fixed)):
         for pattern in patterns:
             places = [key for key, rows in paths.items() if any(fnmatchcase(path, pattern) for path, _, _ in rows)]
@@ -135,10 +132,41 @@ def _one_value(pattern: str, rows: Sequence[tuple[str, Any, int]]) -> float:
     return rows[0][1]
 
 
+def tables_of(params: Registers, name: str) -> dict[tuple[type[Registers], str], Table]:
+    """Arrays of the parameters that are tables, where their class occurs once: constants of a unit of this name."""
+    found: dict[tuple[type[Registers], str], list[Table]] = {}
+    for path, registers, field, value in every(params):
+        if field.table and field.width is not None:
+            read = f"{name}_{field.width.code}".upper() + f"({name.upper()}_TABLE({{text}}), {{index}})"
+            made = Table(f"{name}_{path.replace('.', '_')}", field.width, field.length, (min(value), max(value)), read)
+            found.setdefault((type(registers), field.name), []).append(made)
+    return {place: tables[0] for place, tables in found.items() if len(tables) == 1}
+
+
+def every(registers: Registers, prefix: str = "") -> Iterator[tuple[str, Registers, Field, Any]]:
+    """Every register: its path, the register file that it stands in, its declaration and its value."""
+    for field, value in members(registers):
+        if field.block is not None:
+            yield from every(value, f"{prefix}{field.name}.")
+        else:
+            yield prefix + field.name, registers, field, value
+
+
 def members(registers: Registers) -> Iterator[tuple[Field, Any]]:
     """Every field of a register file with what stands in it."""
     for field in type(registers).__fields__.values():
         yield field, getattr(registers, field.name)
+
+
+def refuse_floats(unit: ControlUnit, target: str) -> None:
+    """Refuse a unit with floats for a processor whose `double` has 32 bits (FW05)."""
+    roots = {"params": unit.params, "controller": unit.controller, "lines": unit.lines}
+    for root, registers in roots.items() if target in NARROW else ():
+        for leaf in registers.leaves():
+            if leaf.width.is_float:
+                got = f"{root}.{leaf.path}, a number of 64 bits, for {target}, whose double has 32"
+                expected = "a controller of whole numbers"
+                raise RefusedError("FW05", None, got, expected, "a variant in whole numbers, or another --target")
 
 
 def outside_ranges(params: Registers) -> Iterator[tuple[str, float, tuple[float, float]]]:
@@ -148,14 +176,12 @@ def outside_ranges(params: Registers) -> Iterator[tuple[str, float, tuple[float,
             yield path, value, claimed
 
 
-def ranged(registers: Registers, prefix: str = "") -> Iterator[tuple[str, float, tuple[float, float]]]:
+def ranged(registers: Registers) -> Iterator[tuple[str, float, tuple[float, float]]]:
     """Every value of which a range is declared: path, value, range."""
-    for field, value in members(registers):
-        if field.block is not None:
-            yield from ranged(value, f"{prefix}{field.name}.")
-        elif field.range is not None:
+    for path, _, field, value in every(registers):
+        if field.range is not None:
             for k, one in enumerate(value if field.length else [value]):
-                yield f"{prefix}{field.name}" + (f"[{k}]" if field.length else ""), one, field.range
+                yield path + (f"[{k}]" if field.length else ""), one, field.range
 
 
 def unit_of(axis: Axis, prefix: str = "", motor: str = "") -> ControlUnit:

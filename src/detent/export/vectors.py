@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
-from detent.export.unit import LARGE, ControlUnit
+from detent.export.unit import LARGE, ControlUnit, signal_widths
 from detent.kernel.image import add_bytes, add_rows, begin_hash
 from detent.kernel.loop import Bytes
 from detent.kernel.registers import PLANT, Leaf, Registers
@@ -210,9 +210,43 @@ class Golden:
         """The file, once the run is over."""
         if self.ticks % STRETCH:
             self._check()
-        data, over_all = b"".join(self.parts) + struct.pack("<BQ", END, self.ticks), begin_hash()
-        add_bytes(over_all, data)
-        return data + struct.pack("<Q", over_all.number)
+        return _ended(b"".join(self.parts), self.ticks)
+
+
+def cut(unit: ControlUnit, data: bytes, most: int) -> tuple[bytes, int, str]:
+    """Vectors of the first ticks, up to the last check that is not behind `most`; these ticks, and the hash there."""
+    image = sum(_size(leaf) for leaf in unit.leaves)
+    signals = [width.size for width in signal_widths(next(iter(unit.entries.values())))]
+    calls = [sum(int(code[1:]) for code in taken if code in FORMATS) for taken in unit.calls.values()]
+    place, ticks, found = len(MAGIC) + 5, 0, (b"", 0, "")
+    if data[: len(MAGIC) + 5] != MAGIC + struct.pack("<BI", VERSION, unit.layout_hash):
+        raise DetentError("job.vec: got vectors of other registers; expected: those of this version; export it anew")
+    while data[place] != END:
+        kind = data[place]
+        if kind == WRITE:
+            place += 13
+        elif kind == TICKS:
+            count = int.from_bytes(data[place + 1 : place + 3], "little")
+            place, ticks = place + 3 + count, ticks + count
+        elif kind == SIGNAL:
+            place += 6 + int.from_bytes(data[place + 2 : place + 6], "little") * signals[data[place + 1]]
+        elif kind == CALL:
+            place += 2 + calls[data[place + 1]]
+        else:
+            told = f"{int.from_bytes(data[place + 1 : place + 9], 'little'):016x}"
+            place += 9 + image
+            if ticks > most:
+                break
+            found = _ended(data[:place], ticks), ticks, told
+    return found
+
+
+def _ended(data: bytes, ticks: int) -> bytes:
+    """The file, from all its records but the last one."""
+    data += struct.pack("<BQ", END, ticks)
+    over_all = begin_hash()
+    add_bytes(over_all, data)
+    return data + struct.pack("<Q", over_all.number)
 
 
 def _size(leaf: Leaf) -> int:

@@ -12,12 +12,22 @@ from detent import __version__
 from detent.axis import Axis
 from detent.errors import DetentError, InputError
 from detent.export.a2l import a2l_text
-from detent.export.code import FLAGS, as_json, drawn_text, parameters, registers, seconds, signals_of, texts
+from detent.export.code import (
+    FLAGS,
+    PROCESSORS,
+    as_json,
+    drawn_text,
+    parameters,
+    registers,
+    seconds,
+    signals_of,
+    texts,
+)
 from detent.export.drawn import FILES, ROUNDS, Chance, drawn_vectors
 from detent.export.serial import serial_texts
 from detent.export.translate.program import Function, Program
 from detent.export.translate.values import RefusedError
-from detent.export.unit import ControlUnit, options_of, outside_ranges, unit_of
+from detent.export.unit import ControlUnit, options_of, outside_ranges, refuse_floats, unit_of
 from detent.export.vectors import FORMATS, Golden, record
 from detent.files.text import write_errors
 from detent.methods.check import check_spec
@@ -43,6 +53,7 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
     job: str | Path | None = None,
     motor: str = "",
     prefix: str = "",
+    target: str = "host",
     ticks: int = TICKS,
     files: int = FILES,
     rounds: int = ROUNDS,
@@ -63,6 +74,8 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
         Which one, of an axis with several.
     prefix : str, optional
         Of all names in C; default: from the name of the motor or the axis.
+    target : str, optional
+        What it is for, of `code.PROCESSORS`: decides what is refused, and the flags of build.mk; the C is the same.
     ticks : int
         Ticks of the golden run at most, 1 or more.
     files : int
@@ -86,14 +99,17 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
     DetentError
         The folder holds other files (FW14), or the job made no tick.
     """
-    target = Path(folder)
+    place = Path(folder)
+    if target not in PROCESSORS:
+        raise DetentError(f"--target: got {target}; expected: one of {', '.join(PROCESSORS)}; name one of these")
     if ticks < 1:
         raise DetentError(f"--ticks: got {ticks}; expected: 1 or more; try: leave it out for {TICKS}")
     for option, count in (("--files", files), ("--rounds", rounds)):
         if count < 0:
             raise DetentError(f"{option}: got {count}; expected: 0 or more; try: leave it out")
-    refuse_other_files(target)
+    refuse_other_files(place)
     unit = unit_of(axis, prefix, motor)
+    refuse_floats(unit, target)
     loaded = axis.load_job(job) if job is not None else axis.method.trial_job(axis.spec)
     golden = record(unit, axis, loaded, ticks)
     if golden.params is None or golden.ticks == 0:
@@ -102,7 +118,8 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
         got = f"{path} = {value}"
         raise RefusedError("FW12", None, got, f"{lo} to {hi}", "change the axis file until the value fits")
     program = unit.translated(golden.params, tunable, fixed)
-    code = texts(unit, program, golden, axis.name, seconds(axis.simulated.tick)) | serial_texts(axis, unit, axis.name)
+    code = texts(unit, program, golden, axis.name, seconds(axis.simulated.tick), target)
+    code |= serial_texts(axis, unit, axis.name)
     made: dict[str, bytes] = {name: text.encode() for name, text in code.items()}
     for row in parameters(program, golden.params):
         if row.number in golden.changed and not row.expression:
@@ -116,14 +133,15 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
     made["vectors/params.bin"] = bytes(golden.params)
     made["vectors/drawn.vec"] = drawn_vectors(chance, files, rounds)
     manifest = _manifest(axis, loaded.name, golden, program)
+    manifest["target"] = target
     manifest["drawn"] = {"files": files, "rounds": rounds}
     manifest["folding"] = {"tunable": list(tunable), "fixed": list(fixed)}
     made["README.md"] = readme(manifest, unit, seconds(axis.simulated.tick)).encode()
     manifest["files"] = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(made.items())}
     made[MANIFEST] = as_json(manifest).encode()
-    before = (read_manifest(target) or {}).get("not proven", {})
-    _write(target, made)
-    return Exported(target, unit.name, manifest, {what: len(rows) for what, rows in before.items()})
+    before = (read_manifest(place) or {}).get("not proven", {})
+    _write(place, made)
+    return Exported(place, unit.name, manifest, {what: len(rows) for what, rows in before.items()})
 
 
 def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[str, Any]:
@@ -226,7 +244,7 @@ def readme(manifest: Mapping[str, Any], unit: ControlUnit, tick: str) -> str:
 
 Written by detent {manifest["detent"]} from an axis of the method {manifest["method"]}. C99, no heap, no globals.
 
-1. Compile `{name}.c` and `{name}_params.c` with `{manifest["flags"]}`. Never `-ffast-math`.
+1. Compile the sources of `build.mk` with its flags, `{manifest["flags"]}` among them. Never `-ffast-math`.
 2. At power-on: check `{name}_selftest() == 0` and `{name}_check_params(&{name}_defaults) == 0`, set a
    `{name}_controller` and a `{name}_lines` to zero bytes, write what the sensors show into the lines, and call
    `{unit.begins}`.

@@ -69,6 +69,7 @@ class Field:
     by: str = ""  # who writes a wire between controller and plant; empty elsewhere
     range: tuple[float, float] | None = None  # least and largest value that is ever stored, where one is claimed
     option: bool = False  # of parameters: it chooses a variant, and is a constant of the firmware
+    table: bool = False  # of arrays of parameters: numbers that firmware keeps among its constants
     name: str = ""
     offset: int = 0  # bytes from the start of the structure
     width: Width | None = None  # None for a nested block
@@ -101,13 +102,14 @@ def register(  # noqa: PLR0913 - all that can be said of one
     by: str = "",
     range: tuple[float, float] | None = None,  # noqa: A002 - the word for it
     option: bool = False,
+    table: bool = False,
 ) -> Any:
     """Declare a register; a wire says by whom it is written, `PLANT` or `CONTROLLER`.
 
     `range` claims something of every value ever stored, and changes neither width nor layout; with
     ``DETENT_CHECK_RANGES=1`` plain steps raise on a store outside.
     """
-    return Field(doc, unit, length, by, range, option)
+    return Field(doc, unit, length, by, range, option, table)
 
 
 def block(doc: str, *, by: str = "") -> Any:

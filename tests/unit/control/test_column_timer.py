@@ -5,6 +5,7 @@ import pytest
 from tests.print_head_rig import EMITTER, Rig
 
 from detent.control.column_timer import (
+    AHEAD,
     COLUMNS,
     HALF_EMITTER,
     NEVER,
@@ -15,7 +16,6 @@ from detent.control.column_timer import (
     next_column,
     schedule,
     set_lead,
-    skip_white,
     start_line,
 )
 from detent.methods.print_head.controller import PERIOD_US
@@ -39,49 +39,73 @@ def inked(*columns, bank=0):
     return b
 
 
-def started(b, first, last, direction, bank=0):
+def started(first, last, direction, bank=0):
     r = ColumnTimer(bank=bank)
-    start_line(r, b, first, last, direction)
+    start_line(r, first, last, direction)
     return r
 
 
-def test_a_line_starts_at_its_first_inked_column():
-    b = inked(3, 7, 9)
-    assert started(b, 0, 20, 1).column == 3
-    assert started(b, 20, 0, -1).column == 9
-    assert started(b, 4, 8, 1).column == 7
+def far_off(p, r, b, direction, emitters=1):
+    """Emitters half a line before the columns."""
+    for _ in range(emitters):
+        schedule(p, r, b, 100 - direction * 4000, direction, 1000, 200)
+    return r
 
 
-def test_the_banks_are_separate():
+@pytest.mark.parametrize(
+    ("first", "last", "direction", "column"), [(0, 15, 1, 3), (15, 0, -1, 9), (4, 8, 1, 7), (8, 4, -1, 7)]
+)
+def test_white_columns_are_passed_at_the_first_emitter(p, first, last, direction, column):
+    r = far_off(p, started(first, last, direction), inked(3, 7, 9), direction)
+    assert (r.column, r.active, r.missed, r.fire_us) == (column, 1, 0, NEVER)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_an_emitter_looks_at_no_more_than_so_many_columns(p, direction):
+    """The head is 0.4 columns further at each: what is left is passed ahead of it."""
+    r, b = started(*((0, 100) if direction > 0 else (100, 0)), direction), inked(*((40,) if direction > 0 else (60,)))
+    places = [far_off(p, r, b, direction).column for _ in range(5)]
+    passed = [min(AHEAD * (k + 1), 40) for k in range(5)]
+    assert places == [k if direction > 0 else 100 - k for k in passed]
+    assert r.active
+
+
+def test_the_banks_are_separate(p):
     b = inked(5, bank=1)
-    assert not started(b, 0, 20, 1, bank=0).active
-    assert started(b, 0, 20, 1, bank=1).column == 5
+    assert not far_off(p, started(0, 14, 1, bank=0), b, 1).active
+    assert far_off(p, started(0, 14, 1, bank=1), b, 1).column == 5
 
 
-@pytest.mark.parametrize(("first", "last", "direction"), [(10, 12, 1), (12, 10, -1), (20, 0, 1), (0, 20, -1)])
-def test_white_or_empty_intervals_are_done_at_once(first, last, direction):
-    r = started(inked(3), first, last, direction)
+@pytest.mark.parametrize(("first", "last", "direction"), [(10, 12, 1), (12, 10, -1)])
+def test_a_white_line_is_done_at_its_first_emitter(p, first, last, direction):
+    r = far_off(p, started(first, last, direction), inked(3), direction)
+    assert (r.active, r.missed, r.fire_us) == (0, 0, NEVER)
+
+
+@pytest.mark.parametrize(("first", "last", "direction"), [(20, 0, 1), (0, 20, -1)])
+def test_an_empty_interval_is_done_at_once(first, last, direction):
+    r = started(first, last, direction)
     assert not r.active
     assert r.fire_us == NEVER
 
 
-def test_columns_beyond_the_buffer_are_cut_off():
+def test_columns_beyond_the_buffer_are_cut_off(p):
     b = inked(0, COLUMNS - 1)
-    r = started(b, -50, 5000, 1)
+    r = started(-50, 5000, 1)
     assert (r.column, r.end_column) == (0, COLUMNS - 1)
-    next_column(r, b, 1)
-    assert r.column == COLUMNS - 1
-    next_column(r, b, 1)
+    next_column(r)
+    assert far_off(p, r, b, 1, COLUMNS // AHEAD).column == COLUMNS - 1
+    next_column(r)
     assert not r.active
 
 
-def test_skip_white_stops_at_the_end_column():
-    b = inked(3, 30)
-    r = started(b, 0, 10, 1)
-    next_column(r, b, 1)
-    assert not r.active
-    skip_white(r, b, 1)
-    assert r.column == 10
+def test_white_is_passed_up_to_the_end_column(p):
+    r = started(0, 10, 1)
+    far_off(p, r, inked(3, 30), 1)
+    next_column(r)
+    far_off(p, r, inked(3, 30), 1)
+    assert (r.column, r.active) == (10, 0)
+    assert far_off(p, r, inked(3, 30), 1).column == 10
 
 
 def test_lead_is_speed_times_flight_time(p):
@@ -94,7 +118,7 @@ def test_lead_is_speed_times_flight_time(p):
 
 @pytest.mark.parametrize(("direction", "column", "emitter"), [(1, 4, 109), (-1, 4, 111)])
 def test_a_column_is_fired_between_the_emitters(p, direction, column, emitter):
-    r = started(inked(column), *((0, 20) if direction > 0 else (20, 0)), direction)
+    r = started(*((0, 15) if direction > 0 else (15, 0)), direction)
     # Column 4 lies where emitter 110 begins; the head passes its neighbour with 200 us per emitter.
     r.lead = 64
     schedule(p, r, inked(column), emitter, direction, 1000, 200)
@@ -103,7 +127,7 @@ def test_a_column_is_fired_between_the_emitters(p, direction, column, emitter):
 
 def test_a_column_beyond_the_next_emitter_waits(p):
     b = inked(4)
-    r = started(b, 0, 20, 1)
+    r = started(0, 15, 1)
     schedule(p, r, b, 108, 1, 1000, 200)
     assert (r.fire_us, r.missed) == (NEVER, 0)
     schedule(p, r, b, 109, 1, 1200, 200)
@@ -115,7 +139,7 @@ def test_a_column_beyond_the_next_emitter_waits(p):
 
 def test_a_due_column_is_not_scheduled_again(p):
     b = inked(4)
-    r = started(b, 0, 20, 1)
+    r = started(0, 15, 1)
     schedule(p, r, b, 110, 1, 1400, 200)
     schedule(p, r, b, 111, 1, 1600, 200)
     assert (r.fire_us, r.missed) == (1400, 0)
@@ -123,7 +147,7 @@ def test_a_due_column_is_not_scheduled_again(p):
 
 def test_columns_behind_the_head_or_without_an_interval_are_missed(p):
     b = inked(2, 4, 8)
-    r = started(b, 0, 20, 1)
+    r = started(0, 15, 1)
     schedule(p, r, b, 112, 1, 1000, 200)  # columns 2 and 4 lie at 105 and 110, column 8 at 120
     assert (r.missed, r.column, r.fire_us) == (2, 8, NEVER)
     schedule(p, r, b, 120, 1, 1000, 0)
@@ -133,14 +157,17 @@ def test_columns_behind_the_head_or_without_an_interval_are_missed(p):
 @pytest.mark.parametrize("direction", [1, -1])
 def test_behind_a_fired_column_the_next_one_waits_for_its_emitter(p, direction):
     b = inked(4, 8)
-    r = started(b, *((0, 20) if direction > 0 else (20, 0)), direction)
-    column = r.column
+    r = started(*((0, 15) if direction > 0 else (15, 0)), direction)
+    column = far_off(p, r, b, direction).column
     schedule(p, r, b, 100 + column * 5 // 2, direction, 1000, 200)
     assert r.fire_us == 1000
-    fired(r, b, direction)
-    assert (r.fired, r.column, r.fire_us, r.active) == (1, 12 - column, NEVER, 1)
-    fired(r, b, direction)
-    assert (r.fired, r.active) == (2, 0)
+    fired(r)
+    assert (r.fired, r.column, r.fire_us, r.active) == (1, column + direction, NEVER, 1)
+    schedule(p, r, b, 101 + column * 5 // 2 if direction > 0 else 99 + column * 5 // 2, direction, 1200, 200)
+    assert (r.column, r.fire_us) == (12 - column, NEVER)
+    fired(r)
+    assert (r.fired, r.active) == (2, 1)
+    assert not far_off(p, r, b, direction).active
 
 
 def printed(rig, start, end):

@@ -14,7 +14,9 @@ from detent.control.guard import (
     TRAVEL,
     Guard,
     GuardParams,
+    Weighing,
     await_arrival,
+    begin_weighing,
     enable_guard,
     is_overdue,
     watch,
@@ -95,25 +97,26 @@ def runaway(way, push, answer, samples=12):
 @pytest.mark.parametrize("way", [1, -1])
 @pytest.mark.parametrize(("push", "answer", "code"), [(1.0, 1.0, REVERSED), (12.0, -1.0, 0), (30.0, -1.0, 0)])
 def test_effort_that_holds_back_what_a_force_drives_is_no_reversed_sensor(way, push, answer, code):
-    p, g = GuardParams(reversed=10), Guard()
+    p, g, w = GuardParams(reversed=10), Guard(), Weighing()
     for effort, moved in runaway(way, push, answer):
-        weigh_effort(g, effort, moved)
+        weigh_effort(w, g, effort, moved)
         watch(p, g, 0, 0, 0, way if abs(effort) > 1.0 else 0, moved)
     assert g.code == code
     enable_guard(g)
-    assert (g.code, g.effort, g.moved, g.against) == (0, 0.0, 0, 0)
+    begin_weighing(w)
+    assert (g.code, g.driven, w.effort, w.moved, w.against) == (0, 0, 0.0, 0, 0)
 
 
 @pytest.mark.parametrize("way", [1, -1])
 @pytest.mark.parametrize(("weighed", "code"), [(True, 0), (False, REVERSED)])
 def test_a_sensor_that_has_counted_right_once_is_not_reversed(way, weighed, code):
-    p, g = GuardParams(reversed=6), Guard()
+    p, g, w = GuardParams(reversed=6), Guard(), Weighing()
     right, against = [way * k for k in range(8)], [-way * k for k in range(20)]
     for moved in right + against:
         if weighed:
-            weigh_effort(g, 1.0 * way, moved)
+            weigh_effort(w, g, 1.0 * way, moved)
         watch(p, g, 0, 0, 0, way, moved)
-    assert (g.code, g.proven) == (code, weighed)
+    assert (g.code, g.proven, g.driven) == (code, 1, weighed)
 
 
 @pytest.mark.parametrize("way", [1, -1])

@@ -35,7 +35,7 @@ from detent.control.head_computer import (
     HeadComputer,
     HeadParams,
 )
-from detent.control.latch import pass_on, read_latch, write_latch
+from detent.control.latch import ROOM, pass_on, read_latch, write_latch
 
 WIDTH = 4350
 
@@ -147,6 +147,13 @@ def test_a_full_queue_refuses_in_order_and_loses_no_answer(c):
     answer(c, c.start)
     assert c.queue.waiting == 0
     assert answers(c) == [OK] * (QUEUE - 1) + [OVERRUN] * 5
+
+
+def test_a_flood_that_was_refused_is_answered_as_far_as_the_port_holds_it(c):
+    c.operation, c.end = REFUSED, (1 << 31) - 1
+    answer(c, OVERRUN)
+    assert (c.status.waiting, c.status.latch.byte) == (ROOM - 1, OVERRUN)
+    assert c.status.lost == (1 + c.end - ROOM) & 0xFF
 
 
 @pytest.mark.parametrize(("s", "code"), [(0, 2), (17, 2), (18, 0), (100, 0), (240, 0), (241, 2), (255, 2)])

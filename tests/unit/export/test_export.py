@@ -10,7 +10,7 @@ import pytest
 import detent
 from detent.errors import DetentError, InputError
 from detent.export.code import range_checks, seconds, template
-from detent.export.translate.values import RefusedError
+from detent.export.translate.values import RefusedError, Shape
 from detent.export.unit import options_of, outside_ranges, unit_of
 from detent.export.vectors import CALL, CHECK, END, SIGNAL, TICKS, WRITE, Golden, record
 from detent.export.verify import TARGETS, Target, differences, told_of, verify
@@ -89,7 +89,7 @@ class Ranged(Registers):
 
 
 def test_a_range_is_checked_where_its_width_does_not_hold_it_anyway():
-    found = range_checks(SimpleNamespace(options={(Ranged, "folded"): 1}), Ranged())
+    found = range_checks(SimpleNamespace(options={(Ranged, "folded"): 1}, shape=Shape()), Ranged())
     assert [(one["number"], one["text"], one["length"]) for one in found] == [
         (2, "(p->share >= 0.5) && (p->share <= 1.0)", 0), (3, "(p->low <= 9)", 0), (5, "(p->table[k] <= 5)", 3),
     ]  # fmt: skip

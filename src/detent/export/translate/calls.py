@@ -18,6 +18,7 @@ from detent.export.translate.values import (
     as_whole,
     cast,
     join,
+    number,
     outside_language,
     real,
     truth,
@@ -57,14 +58,14 @@ class Calls(Expressions):
         if len(node.args) != len(g.parameters):
             raise outside_language(node, f"{len(node.args)} arguments", f"hand over {len(g.parameters)}")
         values = self.ordered(node.args)
-        args = [self._argument(node, g, name, value) for name, value in zip(g.parameters, values, strict=True)]
-        text = f"{g.cname}({', '.join(args)})"
+        args = {name: self._argument(node, g, name, value) for name, value in zip(g.parameters, values, strict=True)}
+        text = f"{g.cname}({', '.join(args[name] for name in self.program.arguments(g))})"
         if self.program.writes(self.f, node):
             self.written()
         if g.result_kind == "int":
             made = g.result
             return (
-                whole(text, "int32_t", 0, 0)
+                whole(text, "int", 0, 0)
                 if made is None
                 else replace(made, text=text, ctype=type_of_local(made), literal=False)
             )
@@ -145,6 +146,8 @@ class Calls(Expressions):
         value = self._one(node)
         if value.kind != "signal":
             raise outside_language(node, "the length of no signal", "use the number")
+        if value.length:
+            return number(value.length)
         return whole(f"{value.text}.length", "int32_t", 0, (1 << 31) - 1)
 
     def _extreme(self, node: ast.Call, name: str) -> Value:

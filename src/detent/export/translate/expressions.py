@@ -13,6 +13,7 @@ from detent.export.translate.values import (
     SUM,
     UNARY,
     RefusedError,
+    Table,
     Value,
     as_real,
     as_truth,
@@ -94,7 +95,7 @@ class Expressions(Integers):
             return self.refined(value)
         if node.id in self.f.names or node.id in self.f.assigned:
             # Nothing is known of it yet: a later turn over the program does.
-            return whole(node.id, "int32_t", 0, 0)
+            return whole(node.id, "int", 0, 0)
         constant = self.f.globals.get(node.id)
         if isinstance(constant, bool | float):
             return number(constant)
@@ -125,6 +126,9 @@ class Expressions(Integers):
             return Value(kind="file", text="&" + place, registers=found.block)
         if found.width is None:
             raise outside_language(ast.Pass(), f"{place}, which has no width", "declare one")
+        table = self.program.shape.tables.get((registers, found.name))
+        if table is not None:
+            return array_of(table, "array")
         if found.length:
             trusted = found.range if registers in self.program.fixed else None
             return Value(kind="array", text=place, width=found.width, length=found.length, within=trusted)
@@ -133,20 +137,21 @@ class Expressions(Integers):
             return number(fixed)
         if found.width.is_float:
             return real(place)
-        lo, hi = interval_of(found.width)
-        if found.range is not None:
-            lo, hi = max(lo, int(found.range[0])), min(hi, int(found.range[1]))
-        return self.refined(whole(place, INTEGERS[found.width.code], lo, hi))
+        width, claimed = self.program.stored(registers, found)
+        lo, hi = interval_of(width)
+        if claimed is not None:
+            lo, hi = max(lo, int(claimed[0])), min(hi, int(claimed[1]))
+        return self.refined(whole(place, INTEGERS[width.code], lo, hi))
 
     def check_index(self, node: ast.AST, array: Value, index: Value) -> None:
         """Refuse an index that may lie outside."""
         if index.kind != "int" or array.kind not in ("array", "signal"):
             raise outside_language(node, f"{ast.unparse(node)}", "index an array of registers with an integer")
         inside = index.lo >= 0 and (
-            index.hi < array.length if array.kind == "array" else (index.text, array.text) in self.facts.below
+            index.hi < array.length if array.length else (index.text, array.text) in self.facts.below
         )
         if self.final and not inside:
-            length = str(array.length) if array.kind == "array" else f"len({array.text})"
+            length = str(array.length) if array.length else f"len({array.text})"
             got = f"an index from {index.lo} to {index.hi}: {ast.unparse(node)}"
             raise RefusedError("FW09", node, got, f"one from 0 to below {length}", "declare a range of the register")
 
@@ -154,8 +159,7 @@ class Expressions(Integers):
         """An element."""
         array, index = self.expr(node.value), self.expr(node.slice)
         self.check_index(node, array, index)
-        at = f"{array.text}.at" if array.kind == "signal" else array.text
-        text = f"{at}[{index.text}]"
+        text = array.element.format(text=array.text, index=index.text)
         if array.width is None:
             raise outside_language(node, f"{text}, which has no width", "declare one")
         if array.width.is_float:
@@ -252,6 +256,11 @@ class Expressions(Integers):
     def _chosen(self, node: ast.AST, test: Value, a: Value, b: Value) -> Value:
         if a.kind == b.kind == "bool":
             return truth(f"({test.text}) ? {in_brackets(a, UNARY)} : {in_brackets(b, UNARY)}", ANY + 1)
+        if a.kind == b.kind == "signal" and a.width is b.width:
+            text = f"(({test.text}) ? {a.text} : {b.text})"
+            below = {one: {place for place, signal in self.facts.below if signal == one.text} for one in (a, b)}
+            self.facts.below |= {(place, text) for place in below[a] & below[b]}
+            return replace(a, text=text, length=min(a.length, b.length))
         if a.kind == b.kind == "file" and a.registers is b.registers:
             return replace(a, text=f"({test.text}) ? {a.text} : {b.text}", level=ANY + 1)
         a, b = as_whole(a), as_whole(b)
@@ -315,9 +324,19 @@ class Expressions(Integers):
         settled = None if a.acts or b.acts else _settled(op, a, b)
         if settled is not None:
             return decided(settled)
+        beside = a if b.literal and b.lo >= 0 else b if a.literal and a.lo >= 0 else None
+        if beside is not None and beside.lo >= 0 and RANK[beside.ctype] < 32:  # whether its type has a sign or not
+            return truth(f"{in_brackets(a, SUM)} {SIGNS[op]} {in_brackets(b, SUM)}")
         bits = 64 if RANK[a.ctype] == 64 or RANK[b.ctype] == 64 else bits_of(a.lo, a.hi, b.lo, b.hi)
         _, (a, b) = brought_to(bits, a, b)
         return truth(f"{in_brackets(a, SUM)} {SIGNS[op]} {in_brackets(b, SUM)}")
+
+
+def array_of(table: Table, kind: str) -> Value:
+    """A table, as an array of registers or as a signal."""
+    return Value(
+        kind=kind, text=table.name, width=table.width, length=table.length, element=table.element, within=table.within
+    )
 
 
 def _settled(op: type[ast.cmpop], a: Value, b: Value) -> bool | None:

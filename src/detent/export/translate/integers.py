@@ -25,6 +25,7 @@ from detent.export.translate.values import (
     whole,
 )
 
+SUFFIXES = {"int64_t": "i64", "int32_t": "i32", "int": "int"}  # of helpers that exist for several types
 LONGEST: dict[type[ast.operator], int] = {ast.LShift: 62, ast.RShift: 63}  # shift that is defined in 64 bits
 
 
@@ -45,7 +46,7 @@ class Integers(Known):
 
     def helper(self, name: str, ctype: str) -> str:
         """Name of a function that every program has which needs it."""
-        made = f"{name}_{'i64' if ctype == 'int64_t' else 'i32'}" if ctype else name
+        made = f"{name}_{SUFFIXES[ctype]}" if ctype else name
         self.program.notes.helpers.add(made)
         return f"{self.program.name}_{made}"
 
@@ -112,13 +113,14 @@ class Integers(Known):
             self.wraps(node, "may go beyond 64 bits")
             bits, lo, hi = 64, LOWEST, HIGHEST
         ctype, (a,) = brought_to(bits, a)
-        return whole(f"({ctype})((u{ctype}){in_brackets(a, UNARY)} << {in_brackets(b, UNARY)})", ctype, lo, hi, UNARY)
+        unsigned = "unsigned" if ctype == "int" else f"u{ctype}"
+        return whole(f"({ctype})(({unsigned}){in_brackets(a, UNARY)} << {in_brackets(b, UNARY)})", ctype, lo, hi, UNARY)
 
     def i_RShift(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802
         """``a >> b``, rounded down whatever the compiler does with a sign."""
         corners = [x >> n for x in (a.lo, a.hi) for n in self._check_shift(node, b)]
         # In C a shift by the width or more is not defined: 32 bits only where the count is below that.
-        bits = bits_of(a.lo, a.hi) if b.hi < 32 else 64
+        bits = max(bits_of(a.lo, a.hi), 16 if b.hi < 16 else 32 if b.hi < 32 else 64)
         ctype, (a,) = brought_to(bits, a)
         if a.lo >= 0:
             text = f"{in_brackets(a, UNARY)} >> {in_brackets(b, UNARY)}"

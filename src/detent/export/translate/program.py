@@ -6,16 +6,19 @@ import inspect
 import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
 import detent
+from detent.export.translate.expressions import array_of
 from detent.export.translate.statements import Statements, names_written, targets_of
 from detent.export.translate.values import (
     C_WORDS,
     INTEGERS,
     Notes,
     RefusedError,
+    Shape,
     Value,
     interval_of,
     real,
@@ -167,15 +170,17 @@ class Program:
     classes of registers that are not those of the classes. All names begin with `name`.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what is translated, and what of it is other in C
         self,
         name: str,
         entries: Mapping[str, Callable[..., Any]],
         params: type[Registers] | None = None,
         options: Mapping[tuple[type[Registers], str], float] | None = None,
         roots: Mapping[type[Registers], str] | None = None,
+        shape: Shape | None = None,
     ) -> None:
         self.name, self.options, self.roots = name, dict(options or {}), dict(roots or {})
+        self.shape = shape or Shape()
         self.steps: dict[Callable[..., Any], Function] = {}
         self.notes = Notes()
         self.changed, self.widens = False, False
@@ -206,11 +211,49 @@ class Program:
             if made in taken:
                 raise RefusedError("FW13", None, f"two functions {made}", "names that differ", "rename a step")
             try:
-                self.steps[py] = Function(py, made, entry=bool(cname))
+                self.steps[py] = f = Function(py, made, entry=bool(cname))
+                for name, value in f.names.items():
+                    if value is not None and value.kind == "signal":
+                        f.names[name] = self._signal(name, value)
             except RefusedError as refused:
                 raise refused.at(f"{py.__module__}.{py.__qualname__}") from None
             self.changed = True
         return self.steps[py]
+
+    def _signal(self, name: str, value: Value) -> Value:
+        """A signal that an argument is: a table of its own, or what the host lays ready."""
+        table = self.shape.laid.get(name)
+        if table is not None:
+            return array_of(table, "signal")
+        eight = value.width is not None and value.width.size == 8
+        read = (
+            "{text}.at[{index}]"
+            if eight or value.width is None
+            else (f"{self.name.upper()}_{value.width.code.upper()}({{text}}.at, {{index}})")
+        )
+        return replace(value, element=read)
+
+    def arguments(self, f: Function) -> list[str]:
+        """Parameters of a step that its function in C has: of what is a constant here nothing is handed over."""
+        found: list[str] = []
+        for name in f.parameters:
+            value = f.names[name]
+            if value is None or not (
+                (value.kind == "signal" and value.length)
+                or (value.kind == "file" and value.registers is not None and self.is_folded(value.registers))
+            ):
+                found.append(name)
+        return found
+
+    def width(self, registers: type[Registers], field: Field) -> Width | None:
+        """Width of a register in C."""
+        return self.shape.narrowed.get((registers, field.name), (field.width, None))[0]
+
+    def stored(self, registers: type[Registers], field: Field) -> tuple[Width, tuple[float, float] | None]:
+        """Width of a register, and the range of what is ever stored there."""
+        if field.width is None:
+            raise RefusedError("FW02", None, f"{field.name}, which has no width", "a register", "declare one")
+        return self.shape.narrowed.get((registers, field.name), (field.width, field.range))
 
     def called(self, f: Function, node: ast.Call) -> Any:
         """What a call calls; None for what is no name of the module."""
@@ -253,7 +296,7 @@ class Program:
     def is_folded(self, registers: type[Registers]) -> bool:
         """True for a class of which no register is left in the structure."""
         return all(
-            self.is_folded(field.block) if field.block else (registers, field.name) in self.options
+            self.is_folded(field.block) if field.block else self._is_elsewhere(registers, field)
             for field in registers.__fields__.values()
         )
 
@@ -262,8 +305,12 @@ class Program:
         return [
             field
             for field in registers.__fields__.values()
-            if (registers, field.name) not in self.options and not (field.block and self.is_folded(field.block))
+            if not (self.is_folded(field.block) if field.block else self._is_elsewhere(registers, field))
         ]
+
+    def _is_elsewhere(self, registers: type[Registers], field: Field) -> bool:
+        """True for a register that is a constant in C, or a table."""
+        return (registers, field.name) in self.options or (registers, field.name) in self.shape.tables
 
     # ---- to a fixed point
 
@@ -306,13 +353,13 @@ class Program:
     def signature(self, f: Function) -> str:
         """Head of a function."""
         if f.result_kind == "int":
-            result = "int32_t" if f.result is None else type_of_local(f.result)
+            result = "int" if f.result is None else type_of_local(f.result)
         elif f.result_class is not None:
             result = f"{self.struct(f.result_class)} *"
         else:
             result = KINDS[f.result_kind]
         parts: list[str] = []
-        for name in f.parameters:
+        for name in self.arguments(f):
             value = f.names[name]
             if value is None:  # only what is called has a text, and then it is known
                 continue
@@ -323,7 +370,7 @@ class Program:
                 parts.append(f"{self.name}_{value.width.code}_signal {name}")
             else:
                 parts.append(f"{value.ctype if f.entry else type_of_local(value)} {name}")
-        hot = "" if f.entry else "static "
+        hot = self.shape.storage or ("" if f.entry else "static ")
         return f"{hot}{result}{'' if result.endswith('*') else ' '}{f.cname}({', '.join(parts) or 'void'})"
 
     def _text(self, f: Function) -> str:

@@ -66,7 +66,7 @@ class Statements(Calls):
                 self.line(f"{self.declaration(value, name)} = {ZERO[value.kind]};")
         self.block(body)
         text = "\n".join(self.lines)
-        unused = [name for name in self.f.parameters if not re.search(rf"\b{name}\b", text)]
+        unused = [name for name in self.program.arguments(self.f) if not re.search(rf"\b{name}\b", text)]
         self.lines[:0] = [f"    (void){name};" for name in unused]
 
     def block(self, body: list[ast.stmt]) -> None:
@@ -334,12 +334,14 @@ class Statements(Calls):
             return
         if isinstance(target, ast.Attribute):
             base = self.expr(target.value)
-            fields = base.registers.__fields__ if base.registers else {}
-            field = fields.get(target.attr)
-            if field is None or field.width is None or field.length:
-                raise outside_language(target, f"a store to {ast.unparse(target)}", "store to single registers")
-            place, width, claimed = self.member(base, target.attr), field.width, field.range
             written = base.registers
+            field = written.__fields__.get(target.attr) if written else None
+            if written is None or field is None or field.width is None or field.length:
+                raise outside_language(target, f"a store to {ast.unparse(target)}", "store to single registers")
+            if self._is_settled(target, written, value):
+                return
+            place = self.member(base, target.attr)
+            width, claimed = self.program.stored(written, field)
         elif isinstance(target, ast.Subscript):
             array, index = self.expr(target.value), self.expr(target.slice)
             self.check_index(target, array, index)
@@ -357,8 +359,17 @@ class Statements(Calls):
         self.line(f"{place} = {self.narrowed(value, width, claimed, target)};")
         self.stored(place, self._fitting(value, width))
 
+    def _is_settled(self, target: ast.Attribute, written: Any, value: Value) -> bool:
+        """True for a store to a register of the state that is a constant here: it must be that one."""
+        fixed = self.program.options.get((written, target.attr))
+        if fixed is None or written in self.program.fixed:
+            return False
+        if not (value.is_constant and value.lo == fixed):
+            raise outside_language(target, f"a store to {target.attr}, which is {fixed} here", "store nothing else")
+        return True
+
     def _store_local(self, target: ast.Name, value: Value) -> None:
-        value = value if value.kind != "int" or value.ctype else replace(value, ctype="int32_t")
+        value = value if value.kind != "int" or value.ctype else replace(value, ctype=type_of_local(value))
         have = self.note(target.id, value)
         if have.kind == "int":
             text = cast(as_whole(value), type_of_local(have)).text

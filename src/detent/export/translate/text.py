@@ -78,19 +78,6 @@ WHOLE_HELPERS = {
     return bits;
 }
 """,
-    "claimed": """int64_t N(claimed)(int64_t value, int64_t lowest, int64_t highest)
-{
-#ifdef FIRMWARE_CHECK
-    if ((value < lowest) || (value > highest)) {
-        __builtin_trap();
-    }
-#else
-    (void)lowest;
-    (void)highest;
-#endif
-    return value;
-}
-""",
 }
 WRAP = """{t} N(wrap_{c})(int64_t value)
 {{
@@ -98,27 +85,67 @@ WRAP = """{t} N(wrap_{c})(int64_t value)
     return (bits > ({u}){most}) ? ({t})(-({t})({u})~bits - 1) : ({t})bits;
 }}
 """
+FLASH = """/* Tables, and what a host lays ready, stay in flash, also where that is another address space. */
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+#define {NAME}_FLASH PROGMEM
+#ifdef __AVR_HAVE_ELPM__
+#define {NAME}_AT(type) uint_farptr_t
+#define {NAME}_TABLE(table) pgm_get_far_address(table)
+#define {NAME}_READ(bits, at, bytes, k) pgm_read_##bits##_far((at) + (uint_farptr_t)(k) * (bytes))
+#else
+#define {NAME}_AT(type) const type *
+#define {NAME}_TABLE(table) (table)
+#define {NAME}_READ(bits, at, bytes, k) pgm_read_##bits((at) + (k))
+#endif
+#else
+#define {NAME}_FLASH
+#define {NAME}_AT(type) const type *
+#define {NAME}_TABLE(table) (table)
+#define {NAME}_READ(bits, at, bytes, k) ((at)[k])
+#endif
+"""
+READS = "#define {NAME}_{CODE}(at, k) (({type}){NAME}_READ({word}, at, {bytes}u, k))\n"
+WORDS = {1: "byte", 2: "word", 4: "dword"}
 MOST = {"i1": "INT8_MAX", "i2": "INT16_MAX", "i4": "INT32_MAX", "i8": "INT64_MAX"}
 C_TYPES = {"i1": "int8_t", "i2": "int16_t", "i4": "int32_t", "i8": "int64_t"}
 
 
-def helper_text(name: str, prefix: str) -> str:
+CLAIMED = """#ifdef FIRMWARE_CHECK
+{storage}int64_t N(claimed)(int64_t value, int64_t lowest, int64_t highest)
+{{
+    if ((value < lowest) || (value > highest)) {{
+        __builtin_trap();
+    }}
+    return value;
+}}
+#else
+#define N(claimed)(value, lowest, highest) (value)
+#endif
+"""
+
+
+def helper_text(name: str, prefix: str, storage: str = "static ") -> str:
     """One helper in C."""
     kind, _, of = name.rpartition("_")
+    if name == "claimed":
+        return re.sub(r"\bN\((\w+)\)", rf"{prefix}_\1", CLAIMED.format(storage=storage))
     if name in WHOLE_HELPERS:
         text = WHOLE_HELPERS[name]
     elif kind == "wrap":
         text = WRAP.format(t=C_TYPES[of], u=UNSIGNED[of], c=of, most=MOST[of])
     else:
-        bits = "64" if of == "i64" else "32"
-        text = HELPERS[kind].format(t=f"int{bits}_t", u=f"uint{bits}_t", c=of)
-    return "static " + re.sub(r"\bN\((\w+)\)", rf"{prefix}_\1", text)
+        t, u = {"i64": ("int64_t", "uint64_t"), "i32": ("int32_t", "uint32_t")}.get(of, ("int", "unsigned"))
+        text = HELPERS[kind].format(t=t, u=u, c=of)
+    return storage + re.sub(r"\bN\((\w+)\)", rf"{prefix}_\1", text)
 
 
 def helpers_text(program: Program) -> str:
     """All helpers that a program needs, the ones that others call first."""
     needed = program.notes.helpers | ({"to_i64"} if "floor" in program.notes.helpers else set[str]())
-    return "\n".join(helper_text(one, program.name) for one in sorted(needed, key=lambda one: (one == "floor", one)))
+    storage = program.shape.storage or "static "
+    order = sorted(needed, key=lambda one: (one == "floor", one))
+    return "\n".join(helper_text(one, program.name, storage) for one in order)
 
 
 def comment_of(text: str) -> str:
@@ -138,7 +165,8 @@ def struct_texts(program: Program, files: Iterable[type[Registers]]) -> str:
         for field in program.fields(registers):
             if field.block is not None:
                 declare(field.block)
-            kind = program.struct(field.block) if field.block else (field.width.c_name if field.width else "")
+            width = program.width(registers, field)
+            kind = program.struct(field.block) if field.block else (width.c_name if width else "")
             array = f"[{field.length}]" if field.length else ""
             unit = f" [{field.unit}]" if field.unit else ""
             rows.append(f"    {kind} {c_field(field.name)}{array}; /* {comment_of(field.doc)}{unit} */\n")
@@ -153,14 +181,26 @@ def struct_texts(program: Program, files: Iterable[type[Registers]]) -> str:
 
 def signals_text(program: Program) -> str:
     """Types of what a host lays ready."""
-    widths = {
-        v.width for f in program.order for v in f.names.values() if v is not None and v.kind == "signal" and v.width
-    }
-    return "".join(
-        f"/* What the host lays ready: where it is, and how much. */\ntypedef struct {{\n    const {one.c_name} *at;\n"
-        f"    int32_t length;\n}} {program.name}_{one.code}_signal;\n\n"
-        for one in sorted(widths, key=lambda one: one.code)
-    )
+    laid = [v for f in program.order for v in f.names.values() if v and v.kind == "signal" and not v.length]
+    widths = sorted({v.width for v in laid if v.width}, key=lambda one: one.code)
+    kept = {t.width for t in program.shape.tables.values()} | {one for one in widths if one.size < 8}
+    parts = [FLASH.format(NAME=program.name.upper())] if kept else []
+    parts += [READS.format(NAME=program.name.upper(), CODE=one.code.upper(), type=one.c_name, bytes=one.size,
+                           word=WORDS[one.size]) for one in sorted(kept, key=lambda one: one.code)]  # fmt: skip
+    parts += ["\n"] if kept else []
+    for one in widths:
+        at = f"const {one.c_name} *at" if one.size == 8 else f"{program.name.upper()}_AT({one.c_name}) at"
+        parts.append(
+            f"/* What the host lays ready: where it is, and how much. */\ntypedef struct {{\n    {at};\n"
+            f"    int32_t length;\n}} {program.name}_{one.code}_signal;\n\n"
+        )
+    parts += [
+        f"/* {comment_of(field.doc)}{f' [{field.unit}]' if field.unit else ''} */\n"
+        f"extern const {table.width.c_name} {table.name}[{table.length}] {program.name.upper()}_FLASH;\n\n"
+        for (registers, name), table in program.shape.tables.items()
+        for field in [registers.__fields__[name]]
+    ]
+    return "".join(parts)
 
 
 def header_of(function: Function, program: Program) -> str:

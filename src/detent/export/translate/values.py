@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,12 +17,15 @@ RANK = {
     "bool": 8,
     "uint8_t": 8,
     "int8_t": 8,
-    "uint16_t": 16,
-    "int16_t": 16,
+    "int16_t": 15,
+    "int": 16,
+    "uint16_t": 17,
     "int32_t": 32,
     "uint32_t": 33,
     "int64_t": 64,
 }
+TYPES = {16: "int", 32: "int32_t", 64: "int64_t"}
+"""What C computes in: `int` has 16 bits on some processors, and what fits in those is never wider there."""
 LOWEST, HIGHEST = -(1 << 63), (1 << 63) - 1  # of 64 bits
 _CALL = re.compile(r"\w\(")
 ATOM, UNARY, PRODUCT, SUM, ANY = 0, 1, 2, 3, 5  # how tightly a text holds together
@@ -78,7 +82,8 @@ class Value:
     truth: bool | None = None  # of a bool that is decided already
     registers: type[Registers] | None = None  # class of a register file
     width: Width | None = None  # of the elements of an array or a signal
-    length: int = 0  # of an array
+    length: int = 0  # of an array, and of a signal that is a table
+    element: str = "{text}[{index}]"  # text of an element of an array or a signal
     within: tuple[float, float] | None = None  # range of its elements, where it can be relied on
     literal: bool = False  # a number, or the name of one
 
@@ -120,8 +125,8 @@ def interval_of(width: Width) -> tuple[int, int]:
 
 
 def bits_of(*numbers: int) -> int:
-    """Bits in which all these numbers fit, with a sign: 32, 64, or 128 for more."""
-    for bits in (32, 64):
+    """Bits in which all these numbers fit, with a sign: 16, 32, 64, or 128 for more."""
+    for bits in (16, 32, 64):
         if all(-(1 << bits - 1) <= one < 1 << bits - 1 for one in numbers):
             return bits
     return 128
@@ -144,7 +149,7 @@ def number(value: float) -> Value:
         wide = bits_of(value) > 32 or value == -(1 << 31)
         text = f"INT64_C({abs(value)})" if wide else str(abs(value))
         text = f"(-{text})" if value < 0 else text
-        return replace(whole(text, "int64_t" if wide else "int32_t", value, value), literal=True)
+        return replace(whole(text, TYPES[bits_of(value)], value, value), literal=True)
     if value != value:  # noqa: PLR0124 - not a number
         raise RefusedError("FW02", None, "a constant that is no number", "a number", "write another one")
     if value in (float("inf"), -float("inf")):
@@ -158,7 +163,7 @@ def as_whole(value: Value) -> Value:
         return value
     if value.truth is not None:
         return number(int(value.truth))
-    return whole(f"({value.text} ? 1 : 0)", "int32_t", 0, 1)
+    return whole(f"({value.text} ? 1 : 0)", "int", 0, 1)
 
 
 def as_real(value: Value) -> Value:
@@ -166,7 +171,7 @@ def as_real(value: Value) -> Value:
     if value.kind == "float":
         return value
     value = as_whole(value)
-    if value.is_constant and bits_of(value.lo) == 32:
+    if value.is_constant and bits_of(value.lo) <= 32:
         return number(float(value.lo))
     return real(f"(double){in_brackets(value, UNARY)}", UNARY)
 
@@ -195,16 +200,18 @@ def cast(value: Value, ctype: str) -> Value:
 
 def brought_to(bits: int, *values: Value) -> tuple[str, list[Value]]:
     """Operands such that C computes in the type of so many bits; that type, and they."""
-    ctype = "int64_t" if bits > 32 else "int32_t"
+    if bits == 16 and any(RANK[one.ctype] >= 32 and not one.literal for one in values):
+        bits = 32
+    ctype = TYPES[min(bits, 64)]
     made = [
         replace(one, text=f"({ctype}){in_brackets(one, UNARY)}", ctype=ctype, level=UNARY)
         if RANK[one.ctype] > RANK[ctype] or one.ctype == "uint32_t"
         else one
         for one in values
     ]
-    if bits > 32 and not any(one.ctype == "int64_t" for one in made):
+    if bits > 16 and not any(one.ctype == ctype and not (one.literal and bits == 32) for one in made):
         k = next((n for n, one in enumerate(made) if not one.literal), 0)
-        made[k] = replace(made[k], text=f"(int64_t){in_brackets(made[k], UNARY)}", ctype="int64_t", level=UNARY)
+        made[k] = replace(made[k], text=f"({ctype}){in_brackets(made[k], UNARY)}", ctype=ctype, level=UNARY)
     return ctype, made
 
 
@@ -238,10 +245,36 @@ def widen(old: Value | None, new: Value) -> Value:
 def type_of_local(value: Value) -> str:
     """C type of a variable that holds it."""
     if value.kind == "int":
-        return "int64_t" if bits_of(value.lo, value.hi) > 32 else "int32_t"
+        return TYPES[min(bits_of(value.lo, value.hi), 64)]
     if value.kind in ("float", "bool"):
         return value.ctype
     raise outside_language(ast.Pass(), f"a variable of kind {value.kind}", "use the registers themselves")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Numbers that do not change: they stand outside of the registers, where a processor keeps constants."""
+
+    name: str
+    width: Width
+    length: int
+    within: tuple[int, int]  # the least and the largest
+    element: str = "{text}[{index}]"
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What of the registers and arguments is other in C than it is declared."""
+
+    tables: Mapping[tuple[type[Registers], str], Table] = field(default_factory=dict[Any, Table])
+    """Arrays of parameters that are tables."""
+    laid: Mapping[str, Table] = field(default_factory=dict[str, Table])
+    """Signals that are tables, by the names of the arguments."""
+    narrowed: Mapping[tuple[type[Registers], str], tuple[Width, tuple[int, int] | None]] = field(
+        default_factory=dict[Any, Any]
+    )
+    """Registers that are as wide, and hold as much, as this axis needs."""
+    storage: str = ""  # of every function, where it is not that of an entry
 
 
 @dataclass

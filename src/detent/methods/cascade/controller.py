@@ -11,7 +11,9 @@ from detent.control.cascade_law import control as control_law
 from detent.control.guard import (
     Guard,
     GuardParams,
+    Weighing,
     await_arrival,
+    begin_weighing,
     enable_guard,
     is_overdue,
     lasting,
@@ -89,6 +91,7 @@ class CascadeController(Registers):
     load_sensor: PositionSensor = block("encoder of the load")
     law: CascadeLaw = block("position and velocity loop")
     guard: Guard = block("what is wrong")
+    weighing: Weighing = block("what the effort makes of a motion against it")
     supervision: Supervision = block("what was seen around the loop")
     count: i8 = register("motor's encoder at the last sample, for the guard", unit="count")
     within: i8 = register("samples in the window up to this one", unit="count")
@@ -124,6 +127,7 @@ def engage(c: CascadeController) -> None:
     """The loops are closed where the axis is, and what the guard has seen is forgotten."""
     c.law.integral = 0.0
     enable_guard(c.guard)
+    begin_weighing(c.weighing)
     c.on = 1
 
 
@@ -228,7 +232,7 @@ def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> 
     moved = count - c.count
     c.count = count
     watch_number(p.guard, c.guard, error)
-    weigh_effort(c.guard, c.law.command, moved)
+    weigh_effort(c.weighing, c.guard, c.law.command, moved)
     return watch(p.guard, c.guard, late, side, c.law.limited > 0, pushing, moved)
 
 
@@ -276,7 +280,7 @@ def sample(
             lower, upper, error = lines.ends.lower, lines.ends.upper, c.law.position_error
             supervise(p.supervision, c.supervision, p.guard, c.guard, lost, apart, lower, upper, error)
             # A word that is none is no jump: until the next one the motor goes on as it did.
-            look_after(p, c, c.count + c.guard.moved if lines.motor.lost else lines.motor.count)
+            look_after(p, c, c.count + c.weighing.moved if lines.motor.lost else lines.motor.count)
             output = output if c.on else 0.0
     warm_up(p.supervision, c.supervision, output)
     lines.enable, lines.command = c.on, output

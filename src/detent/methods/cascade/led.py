@@ -71,7 +71,7 @@ def hear(p: CascadeControllerParams, c: CascadeController, lines: LedLines) -> N
     if c.on:
         # What is told was so a sample ago. Until more is told the motor goes on as it did.
         c.law.position_error = c.reference.position - p.law.period * c.reference.velocity - c.motor_sensor.position
-        look_after(p, c, count if told else c.count + c.guard.moved)
+        look_after(p, c, count if told else c.count + c.weighing.moved)
     else:
         c.law.position_error, c.count = 0.0, count
 

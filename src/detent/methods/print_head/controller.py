@@ -77,7 +77,7 @@ def reverse(p: HeadParams, c: PrintHeadController) -> None:
 @hot_step
 def fired(c: PrintHeadController) -> None:
     """The column that was due at `columns.fire_us` has been fired."""
-    column_timer.fired(c.head.columns, c.head.buffer, c.head.direction)
+    column_timer.fired(c.head.columns)
 
 
 @hot_step
