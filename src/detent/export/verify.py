@@ -18,10 +18,10 @@ from detent.axis import Axis
 from detent.errors import DetentError
 from detent.export.code import FLAGS, PROCESSORS, WARNINGS, short_hash, template
 from detent.export.drawn import Chance, Row
-from detent.export.translate.values import RefusedError
 from detent.export.unit import refuse_floats, unit_named
 from detent.export.vectors import cut
 from detent.export.write import changed_files, export_firmware, manifest_of
+from detent.translate.values import RefusedError
 
 TIMEOUT = 600.0  # of one replay [s]
 TOLD = 20  # registers that are told of a difference

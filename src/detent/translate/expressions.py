@@ -3,8 +3,9 @@
 import ast
 from dataclasses import replace
 
-from detent.export.translate.integers import Integers
-from detent.export.translate.values import (
+from detent.kernel.registers import Field, Registers
+from detent.translate.integers import Integers
+from detent.translate.values import (
     ANY,
     ATOM,
     INTEGERS,
@@ -32,7 +33,6 @@ from detent.export.translate.values import (
     type_of_local,
     whole,
 )
-from detent.kernel.registers import Field, Registers
 
 SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 REAL_SIGNS: dict[type[ast.operator], tuple[str, int]] = {
@@ -271,8 +271,6 @@ class Expressions(Integers):
             raise outside_language(node, f"a choice between {a.kind} and {b.kind}", "choose between numbers")
         lo, hi = min(a.lo, b.lo), max(a.hi, b.hi)
         ctype, (a, b) = brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
-        a, b = (replace(c, text=f"({ctype}){in_brackets(c, UNARY)}", level=UNARY)
-                if c.ctype != ctype and not c.literal else c for c in (a, b))  # fmt: skip
         return whole(f"({test.text}) ? {in_brackets(a, SUM)} : {in_brackets(b, SUM)}", ctype, lo, hi, ANY + 1)
 
     # ---- comparisons

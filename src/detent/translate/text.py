@@ -3,9 +3,9 @@
 import re
 from collections.abc import Iterable
 
-from detent.export.translate.program import Function, Program
-from detent.export.translate.values import c_field
 from detent.kernel.registers import Registers
+from detent.translate.program import Function, Program
+from detent.translate.values import c_field
 
 UNSIGNED = {"i1": "uint8_t", "i2": "uint16_t", "i4": "uint32_t", "i8": "uint64_t"}
 
@@ -218,3 +218,24 @@ def code_text(program: Program) -> str:
     includes += ["<stddef.h>"] if "NULL" in functions else []
     includes += ["<string.h>"] if "memcpy(" in body else []
     return "".join(f"#include {one}\n" for one in includes) + "\n" + body
+
+
+LONGEST = 118
+BREAKS = (" && ", " || ", " ? ", " : ", ", ")
+
+
+def wrapped(code: str) -> str:
+    """The same code in lines that are not too long, broken behind and, or, a comma, and before what a choice gives."""
+    made: list[str] = []
+    for whole_line in code.split("\n"):
+        line, indent = whole_line, " " * (len(whole_line) - len(whole_line.lstrip()) + 8)
+        while len(line) > LONGEST:
+            places = [(line.rfind(one, len(indent) + 1, LONGEST - 2), one) for one in BREAKS]
+            at, one = max(places)
+            if at < 0:
+                break
+            at += 1 if one in (" ? ", " : ") else len(one)
+            made.append(line[:at].rstrip())
+            line = indent + line[at:]
+        made.append(line)
+    return "\n".join(made)

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from detent.export.translate.expressions import Expressions
-from detent.export.translate.values import (
+from detent.kernel import compiled
+from detent.translate.expressions import Expressions
+from detent.translate.values import (
     HIGHEST,
     LOWEST,
     RefusedError,
@@ -26,7 +27,6 @@ from detent.export.translate.values import (
     whole,
     widen,
 )
-from detent.kernel import compiled
 
 
 class Calls(Expressions):

@@ -9,10 +9,10 @@ import pytest
 from tests import firmware_steps
 from tests.firmware_steps import ACCEPTED, REFUSED, Limits, State
 
-from detent.export.translate.program import Program
-from detent.export.translate.text import code_text, signals_text, struct_texts
-from detent.export.translate.values import RefusedError
 from detent.kernel.step import step
+from detent.translate.program import Program
+from detent.translate.text import code_text, signals_text, struct_texts
+from detent.translate.values import RefusedError
 
 
 @pytest.fixture(autouse=True)
