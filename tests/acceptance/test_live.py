@@ -3042,7 +3042,7 @@ def test_13_a_pause_holds_a_job_and_a_stop_empties_its_queue(name: str) -> None:
     bench.pass_time(1.0)
     assert bench.answer.position == pytest.approx(held, abs=2e-4)
     wanted = {"name": "20 moves", "done": done, "of": 20, "paused": True, "shown": {}}
-        assert session.status()["job"] == wanted
+    assert session.status()["job"] == wanted
     assert ("a pause holds its job", "resume, or stop") in why_not_moving(session.status())
     assert session.wait(session.ask("resume", client=7)).how == "done"
     while session.status()["job"]["done"] == done:
