@@ -28,7 +28,7 @@ export function open(root, { link }) {
   let [at, far, active] = [0, null, 0]; // where the head is, and how far it has come in its line [m]
   root.append(h("h1", {}, "Print line"),
     h("p", { class: "hint" }, "Above: the head between its frames, dashed where it is sent. Below: the paper at the head. A glyph stands there once the head has passed it; lines are printed to and fro."),
-    h("svg", { viewBox: "0 0 580 232", class: "drawing wide paper", role: "img", "aria-label": "Head between its frames, and the paper at the head; its position is written above it" },
+    h("svg", { viewBox: "0 -6 580 238", class: "drawing wide paper", role: "img", "aria-label": "Head between its frames, and the paper at the head; its position is written above it" },
       h("path", { d: `M${LEFT} 20V58H${RIGHT}V20`, class: "ink" }), wanted, head, h("path", { d: "M0 70H580", class: "faint" }), paper,
       h("path", { d: "M290 194l-8 14h16z", class: "dot" }), title),
     h("dl", { class: "cards" }, rows.map(([, { row }]) => row)), said);
