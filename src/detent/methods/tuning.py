@@ -137,6 +137,11 @@ class Search(Protocol):
     sides: tuple[str, str]
     """The two things in which candidates differ."""
 
+    @property
+    def job(self) -> Any:
+        """What candidates are tried with unless told otherwise; None for the trial job of the method."""
+        return None
+
     def candidates(self, held: Sequence[str]) -> Sequence[Mapping[str, Any]]:
         """Values that are tried; keys that are held have that of the file."""
         ...

@@ -72,13 +72,6 @@ def test_what_is_out_of_range_is_refused(words, told):
     assert told in json.loads(done.stdout)["error"]
 
 
-@pytest.mark.parametrize("name", ["zoom", "stage"])
-def test_a_method_without_linear_gains_says_so(name):
-    done = run(str(EXAMPLES / f"{name}.toml"), "--json")
-    assert done.exit_code == 2
-    assert "no linear model" in json.loads(done.stdout)["error"]
-
-
 @pytest.mark.compiled
 def test_the_command_tells_gains_and_what_it_has_written(tmp_path):
     written = tmp_path / "new.toml"
