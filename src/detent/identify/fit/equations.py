@@ -111,7 +111,7 @@ def make_run(log: Log, effort: str | None = None) -> Run:
 
 def _usable(log: Log, grid: Values, effort: str) -> NDArray[np.bool_]:
     """Grid samples that are not in gaps, filled in, stuck, saturated or without the drive."""
-    bad = log.mask(Kind.MISSING_VALUES, Kind.STUCK) | log.mask(Kind.SATURATED, signals={effort, "position"})
+    bad = log.mask(Kind.MISSING_VALUES, Kind.STUCK, Kind.SPIKES, Kind.JUMPS) | log.mask(Kind.SATURATED, signals={effort, "position"})
     if effort in {"voltage", "command"} and "enabled" in log.signals:
         # A winding that is switched off does not brake: another axis.
         bad |= log.signals["enabled"] < 0.5

@@ -9,10 +9,11 @@ import numpy as np
 
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.equations import Run
-from detent.identify.fit.estimate import Estimate, rms
+from detent.identify.fit.estimate import Estimate, quantile, rms
 from detent.identify.fit.free_run import Horizon
-from detent.identify.fit.ladder import Climb
-from detent.identify.fit.regression import Prepared
+from detent.identify.fit.ladder import Climb, chosen_climb
+from detent.identify.fit.regression import Fit, Prepared, residuals_of
+from detent.identify.fit.steadiness import SLIGHT, Change
 from detent.logs.log import Kind, Log, Severity, Values
 
 LEAST_MOTION = 1.0  # time in which the axis really moves [s], at least
@@ -24,6 +25,11 @@ WIDEST_MASS = 0.2  # half of the interval of the mass over the mass, at most
 WIDEST_FORCE = 0.15  # half of the interval of a friction or a weight over the effort that moves the axis, at most
 SAME_SPEED = 0.6  # tenth over ninth decile of the speeds of a direction, from which on they count as one speed
 WIDEST_DELAY = 10.0  # half of the interval of the delay, in samples, at most
+MOST_LATE = 2.5  # samples by which the effort may come after the motion that it causes
+COARSE = 0.1  # distance of the levels of an effort, in its size, from which it may say too little
+UNTOLD = 0.06  # residual in this distance from which it does: a command that is one of few levels is exact
+LASTING = 0.9  # correlation of neighbouring residuals from which the model misses something that lasts
+WORST_LASTING = 0.05  # error of the prediction from which that matters
 WORST_PREDICTION = 0.35  # error of the prediction of held-out segments over the effort, at most
 WORST_SIMULATION = 0.7  # simulated error over that of going on with the velocity of the start, at most
 _WAYS = ("positive", "negative")
@@ -33,6 +39,8 @@ _DIRT: dict[Kind, tuple[str, str]] = {
     Kind.WRONG_SIGN: ("wrong sign", "invert the signal in the mapping, as in force=-COLUMN"),
     Kind.WRONG_UNIT: ("wrong unit", "state the unit of the column in the mapping"),
     Kind.LOST_SIGN: ("lost sign", "record the signal with its sign"),
+    Kind.COPIED: ("copied column", "record what the encoder says"),
+    Kind.DROPPED_ROWS: ("lost rows", "record the time of each row with the row"),
 }
 
 
@@ -70,7 +78,9 @@ class Refusal:
 def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:
     """What is wrong with a log before anything is fitted."""
     for finding in log.findings:
-        if finding.kind in _DIRT and finding.severity is not Severity.NOTE:
+        is_clock = finding.kind is Kind.DROPPED_ROWS  # rows whose gap the time shows are only left out
+        least = (Severity.ERROR,) if is_clock else (Severity.ERROR, Severity.WARNING)
+        if finding.kind in _DIRT and finding.severity in least:
             subject, record = _DIRT[finding.kind]
             yield Refusal(subject, f"{log.name}: {finding.signal} {finding.text}", finding.advice or record)
     told = {"position", run.effort_name}
@@ -183,11 +193,51 @@ def _impossible(by_name: dict[str, Estimate], effort: float, top: float) -> Iter
             yield Refusal("friction below 0", text, record, (e.name,))
 
 
+def look_at_fit(fit: Fit, error: float, changes: Sequence[Change], run: Run) -> Iterator[Refusal]:
+    """Whether the fit is that of one axis whose signals belong to the same moments."""
+    large = [change for change in changes if change.share > SLIGHT]
+    if large:
+        most = max(large, key=lambda change: change.share)
+        ends = f"{most.mean - most.amplitude:.4g} to {most.mean + most.amplitude:.4g} {run.unit(most.name)}"
+        text = f"{most.name} changes {most.course} along the log, from {ends}: it is not of one axis and one effort"
+        record = "look for a load put on, an offset or gain of the sensor, a clock that drifts; identify parts alone"
+        yield Refusal("changes along the log", text, record)
+    delay, step = 1e3 * fit.value("delay"), 1e3 * run.step
+    half = 1e3 * quantile(float(fit.degrees[fit.names.index("delay")])) * fit.error("delay")
+    is_known = half < WIDEST_DELAY * step
+    record = "record effort and motion by one clock, unfiltered"
+    if not fit.is_settled and is_known:
+        text = f"up to {delay:.3g} ms, the end of the search, no delay of the effort fits the motion best"
+        yield Refusal("delay out of range", text, record)
+    elif fit.instruments == "reference" and is_known and delay + half < -MOST_LATE * step:
+        text = f"the effort follows the motion that it causes by {-delay:.3g} ms: it came late, or through a filter"
+        yield Refusal("effort is late", text, record)
+    neighbours = residuals_of(fit).neighbours
+    level, effort = level_of(run.effort), rms(run.effort)
+    if level > COARSE * effort and rms(fit.residual) > UNTOLD * level:
+        text = f"{run.effort_name} has steps of {level:.3g} {run.effort_unit}, {level / effort:.0%} of its size"
+        yield Refusal("coarse effort", text, "record the effort with a finer resolution")
+    if error > WORST_LASTING and neighbours > LASTING:
+        text = f"{error:.0%} of the effort are left unexplained, for long stretches (correlation {neighbours:.2f})"
+        record = "look for a filter, a coarse sensor, or friction that depends on the place; record on one axis at a time"
+        yield Refusal("model does not explain the log", text, record)
+
+
+def level_of(effort: Values) -> float:
+    """Distance of the values of an effort from the nearest other value, the root mean square over the samples."""
+    levels, counts = np.unique(effort, return_counts=True)
+    if len(levels) < 2:
+        return 0.0
+    ways = np.diff(levels)
+    nearest = np.minimum(np.r_[np.inf, ways], np.r_[ways, np.inf])
+    return float(np.sqrt(np.sum(counts * nearest**2) / len(effort)))
+
+
 def look_at_prediction(
     climbs: Sequence[Climb], horizons: Sequence[Horizon], refused: Sequence[Refusal]
 ) -> Iterator[Refusal]:
     """Whether the model explains what it did not see; without a mass that is known it cannot be simulated."""
-    chosen = next(c for c in reversed(climbs) if c.taken)
+    chosen = chosen_climb(climbs)
     if not chosen.error < WORST_PREDICTION:
         text = f"the effort on held-out segments is predicted with an error of {chosen.error:.0%}"
         record = "check that the effort is what drives this axis, and its sign, unit and delay"
