@@ -563,7 +563,7 @@ def test_34_a_serial_line_alone_carries_the_proof_and_8_kb_suffice(exported, tmp
     (tmp_path / "board.ld").write_text(template("board.ld.in", **(target.memory | {"data_length": str(beside)})))
     made = run(
         f"{target.compiler} {FLAGS} {target.flags} -Os -DON_UART -T board.ld -Wl,-e,Start -I{folder}", tmp_path,
-        *(str(folder / one) for one in sources(name)), "-o", "unit", *target.libraries.split(),
+        *(str(folder / one) for one in sources(folder, name)), "-o", "unit", *target.libraries.split(),
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     command = [target.emulator, *target.machine.split(), "-nographic", "-monitor", "none", "-serial", "stdio"]

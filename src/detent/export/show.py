@@ -15,13 +15,7 @@ SHOWN = 4  # values of a signal that are told
 
 
 def shown(file: str | Path) -> Iterator[str]:
-    """The lines of a file of vectors that stands in its export.
-
-    Raises
-    ------
-    InputError
-        The file is none, is cut off, or stands in no export.
-    """
+    """The lines of a file of vectors that stands in its export; refused where it is none, cut off, or without one."""
     place = Path(file)
     manifest = manifest_of(place.absolute().parents[1])
     try:

@@ -62,14 +62,17 @@ def test_sizes_are_those_of_the_objects(monkeypatch, tmp_path):
         ),
         ("x-nm", "-S", "params.o"): "00000000 00000190 R t_defaults\n",
         ("x-nm", "-S", "replay.o"): "00000008 00000100 b c_\n00000150 00000020 b l_\n00000000 T t_replay\n",
+        ("x-nm", "-S", "tables.o"): "00000000 00000040 R t_table\n",
         ("x-nm", "-u", "unit.o"): "         U memcpy\n         U __aeabi_dsub\n",
         ("x-objdump", "-d", "job"): LISTING,
         ("x-readelf", "-sW", "job"): "  12: 00000140  16 OBJECT  LOCAL  DEFAULT    1 t_inner\n",
     }
     monkeypatch.setattr(sizes, "_told", lambda command, _: said[tuple(command)])
+    for part in ("params.o", "replay.o", "tables.o"):
+        (tmp_path / part).touch()
     found = sizes_of("x-", tmp_path, ["t_control", "t_none"], "job", 100)
     library = {"__aeabi_dadd": 6, "__aeabi_dsub": 16}
-    assert found == Sizes(480, 20, 6, 0x190 - 100, 100, 0x120, {"t_control": 48}, library)
+    assert found == Sizes(480, 20, 6, 0x190 - 100, 100 + 0x40, 0x120, {"t_control": 48}, library)
     assert found.flash == 500
     assert sizes_of("x-", tmp_path, ["t_control"]).stack == {}
 

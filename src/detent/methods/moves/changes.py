@@ -14,10 +14,7 @@ from detent.record.machine import Machine
 def lay_changes(machine: Machine[Any, Any], changes: Sequence[ParameterChange], file: str) -> None:
     """Have a simulated axis change parameters of its controller.
 
-    Raises
-    ------
-    InputError
-        A name is none of a parameter, an option, or a table; or a value does not fit: each with its line.
+    Refused, each with its line: a name that is none of a parameter, an option, a table, a value that does not fit.
     """
     params, problems = machine.params.controller, list[FileProblem]()
     laid: list[tuple[int, Callable[[Any], None]]] = []
