@@ -338,7 +338,7 @@ class Statements(Calls):
             base = self.expr(target.value)
             fields = base.registers.__fields__ if base.registers else {}
             field = fields.get(target.attr)
-            if field is None or field.width is None or field.length:
+            if base.registers is None or field is None or field.width is None or field.length:
                 raise outside_language(target, f"a store to {ast.unparse(target)}", "store to single registers")
             written = base.registers
             if self._is_settled(target, written, value):
