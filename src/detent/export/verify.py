@@ -51,6 +51,7 @@ class Target:
     share: int = 1  # of the random calls and ticks one in so many is done; 0: none, it has no room for them
     most: int = 0  # ticks of the job; 0: all
     warnings: str = WARNINGS
+    linker: str = ""  # where it is not the compiler
 
     @property
     def missing(self) -> str:
@@ -214,7 +215,7 @@ def _linking(work: Path, target: Target, level: str, program: str, objects: Sequ
     if target.memory is not None:
         (work / "board.ld").write_text(template("board.ld.in", **target.memory), encoding="utf-8")
         more = ["-T", "board.ld", "-Wl,-e," + ("entry_" if target.name == "rv32" else "Start")]
-    command = [target.compiler, *level.split(), *target.flags.split(), *more]
+    command = [target.linker or target.compiler, *level.split(), *target.flags.split(), *more]
     return [*command, *objects, "-o", program, *target.libraries.split()]
 
 
