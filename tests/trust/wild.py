@@ -15,7 +15,6 @@ import numpy as np
 
 from detent.errors import InputError
 from detent.identify.fit.identification import Identification, identify
-from detent.logs.mapping import parse_options
 from detent.logs.read_log import read_log
 from tests.places import DATA
 from tests.trust.faults import FAULTS, Table

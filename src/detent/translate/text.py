@@ -63,6 +63,13 @@ WHOLE_HELPERS = {
     return ((x < (double)t) && (t > INT64_MIN)) ? (t - 1) : t;
 }
 """,
+    "round": """int64_t N(round)(double x)
+{
+    const int64_t below = N(floor)(x);
+    const double rest = x - (double)below;
+    return ((rest > 0.5) || (!(rest < 0.5) && (((uint64_t)below & 1u) != 0u))) ? (below + 1) : below;
+}
+""",
     "power_of_two": """double N(power_of_two)(int64_t exponent)
 {
     const uint64_t bits = (uint64_t)(exponent + 1023) << 52;
@@ -142,9 +149,9 @@ def helper_text(name: str, prefix: str, storage: str = "static ") -> str:
 
 def helpers_text(program: Program) -> str:
     """All helpers that a program needs, the ones that others call first."""
-    needed = program.notes.helpers | ({"to_i64"} if "floor" in program.notes.helpers else set[str]())
+    needed = program.notes.helpers
     storage = program.shape.storage or "static "
-    order = sorted(needed, key=lambda one: (one == "floor", one))
+    order = sorted(needed, key=lambda one: (one in ("floor", "round"), one))
     return "\n".join(helper_text(one, program.name, storage) for one in order)
 
 

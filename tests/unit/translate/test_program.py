@@ -80,7 +80,7 @@ def test_what_is_not_proven_is_told():
 
 def test_functions_stand_behind_those_they_call_with_their_docstrings():
     text = text_of(firmware_steps.effects)
-    assert text.index("static int32_t t_bump(") < text.index("void t_effects(")
+    assert text.index("static int t_bump(") < text.index("void t_effects(")
     assert " * Writes, and gives something.\n" in text
 
 

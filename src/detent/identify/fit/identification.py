@@ -14,11 +14,29 @@ from detent.identify.fit.constants import Constants, constants_of
 from detent.identify.fit.equations import LOSS, Run, make_kernel, make_run
 from detent.identify.fit.estimate import Estimate, quantile
 from detent.identify.fit.free_run import ClosedLoop, Horizon, simulate_closed_loop, simulate_horizons
-from detent.identify.fit.ladder import AT_BOUND, RUNGS, Climb, Rung, bends_tried, chosen_climb, chosen_rung, climb, extended, fit_rung
+from detent.identify.fit.ladder import (
+    AT_BOUND,
+    RUNGS,
+    Climb,
+    Rung,
+    bends_tried,
+    chosen_climb,
+    chosen_rung,
+    climb,
+    extended,
+    fit_rung,
+)
 from detent.identify.fit.output_error import STRETCH, fit_output_error
 from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
 from detent.identify.fit.steadiness import changes_of, widen
-from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_fit, look_at_log, look_at_motion, look_at_prediction
+from detent.identify.fit.verdict import (
+    Refusal,
+    look_at_constants,
+    look_at_fit,
+    look_at_log,
+    look_at_motion,
+    look_at_prediction,
+)
 from detent.logs.log import Log
 
 Report = Callable[[str, float], None]

@@ -4,6 +4,7 @@ All parameters are constants, ramp list and zone limits tables, and no register 
 the envelope are read by a function of the header, which knows where their pages are.
 """
 
+import re
 from typing import get_args
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from detent.control import step_rule
 from detent.control.step_rule import StepRule, StepRuleParams
 from detent.control.step_timer import StepTimer, StepTimerParams
-from detent.kernel.registers import Width, i1, i2, i4, u2, u4
+from detent.kernel.registers import Registers, Width, i1, i2, i4, u2, u4
 from detent.methods.stepper_envelope.controller import (
     NOWHERE,
     StepperController,
@@ -26,6 +27,7 @@ from detent.translate.text import helpers_text, struct_texts, wrapped
 from detent.translate.values import Shape, Table
 
 I1, I2, I4, U2, U4 = (get_args(one)[1] for one in (i1, i2, i4, u2, u4))
+TRUTH, NUMBERS = re.compile(r"\b(bool|true|false)\b"), {"bool": "uint8_t", "true": "1", "false": "0"}
 LARGEST = (1 << 31) - 1
 WORDS = {2: (U2, "{NAME}_READ(word, {table}, (uint16_t)({{index}}))"),
          4: (I4, "((int32_t){NAME}_READ(dword, {table}, (uint16_t)({{index}})))")}  # fmt: skip
@@ -81,7 +83,7 @@ def rule_program(motor: str, p: StepperControllerParams, steps: int, limits: int
         storage="static inline ",
         checks=False,
     )
-    roots = {StepRule: "rule", StepTimer: "timer", StepperController: "registers"}
+    roots: dict[type[Registers], str] = {StepRule: "rule", StepTimer: "timer", StepperController: "registers"}
     calls = {"place_motor": step_rule.place_motor, "start": start, "deflect": deflect, "next": step_along}
     by_name = {f"{motor}_{key}": step for key, step in calls.items()}
     return Program(motor, by_name, StepperControllerParams, constants_of(p), roots, shape)
@@ -107,4 +109,8 @@ def structures(program: Program) -> str:
 def rule_text(program: Program) -> str:
     """The rule: helpers, and the steps, callees first."""
     parts = [helpers_text(program), *(program.texts[f.py] for f in program.order)]
-    return wrapped("\n".join(part for part in parts if part))
+    code = wrapped("\n".join(part for part in parts if part))
+    # The header includes <stdint.h> alone: a truth value is 0 or 1.
+    return re.sub(
+        r"^(?!/\*| \*).*", lambda line: TRUTH.sub(lambda one: NUMBERS[one[0]], line[0]), code, flags=re.MULTILINE
+    )
