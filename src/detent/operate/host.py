@@ -110,7 +110,7 @@ class Log:
         return log
 
 
-def operation_params(speed: float = 1.0, **more: Any) -> Any:
+def operation_params(speed: float = 1.0, *, creep: float = 0.1, **more: Any) -> Any:
     """Give a method what it fills its `OperationParams` with; `speed` is how fast the axis's time passes.
 
     That is ``make(look, window, (lowest, highest), *motions)``: time between two looks and time in the window [s], the
@@ -125,7 +125,7 @@ def operation_params(speed: float = 1.0, **more: Any) -> Any:
         return OperationParams(
             window_looks=looks, lease_looks=lease, job_looks=job,
             settle_looks=math.ceil(SETTLE / look), lowest=limits[0], highest=limits[1], takes=takes,
-            performs=int(ops.JOB not in motions), creep=0.1, **more
+            performs=int(ops.JOB not in motions), creep=creep, **more
         )  # fmt: skip
 
     return make
@@ -142,7 +142,7 @@ class Host:
         wall: bool = True, careful: bool = True, channels: Sequence[str] = (), store: Store | None = None,
         stated: bool = True, memory: mmap | None = None, driver: Driver | None = None,
     ) -> None:  # fmt: skip
-        make = operation_params(speed, careful=int(careful))
+        make = operation_params(speed, careful=int(careful), creep=spec.axis.creep)
         self.method = method.name
         self.board: Any = Board() if memory is None else Board.from_buffer(memory)
         self.link: Link | None = None
