@@ -158,9 +158,7 @@ def late(name: str, share: float) -> Spoil:
 
 def held(name: str, rows: int) -> Spoil:
     """A signal that is updated in every so many rows only."""
-    return lambda table, _: with_(
-        table, **{name: table[name][np.arange(len(table[name])) // rows * rows]}
-    )
+    return lambda table, _: with_(table, **{name: table[name][np.arange(len(table[name])) // rows * rows]})
 
 
 def jitter(share: float) -> Spoil:
