@@ -164,7 +164,7 @@ def judge_fault(asked: tuple[str, int]) -> Outcome:
 
 def judge_faults(numbers: Sequence[int], logs: Sequence[str] = (), workers: int | None = None) -> list[Outcome]:
     """Judge every log with every one of some faults."""
-    asked = [(log, number) for log in logs or SOURCES for number in numbers]
+    asked = [(log, k) for log in logs or SOURCES for k in numbers if (FAULTS[k].needs or "time") in clean(log).table]
     if workers == 1:
         return [judge_fault(one) for one in asked]
     os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
