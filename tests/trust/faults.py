@@ -24,10 +24,13 @@ class Fault:
         What is wrong, for people.
     spoil : callable
         Makes a spoilt table of a clean one.
+    needs : str
+        Column that a log must have; empty for one that all have.
     """
 
     name: str
     spoil: Spoil
+    needs: str = ""
 
 
 def period(table: Table) -> float:
@@ -158,9 +161,7 @@ def late(name: str, share: float) -> Spoil:
 
 def held(name: str, rows: int) -> Spoil:
     """A signal that is updated in every so many rows only."""
-    return lambda table, _: with_(
-        table, **{name: table[name][np.arange(len(table[name])) // rows * rows]}
-    )
+    return lambda table, _: with_(table, **{name: table[name][np.arange(len(table[name])) // rows * rows]})
 
 
 def jitter(share: float) -> Spoil:
@@ -395,9 +396,13 @@ FAULTS = (
     Fault("0.3 s lost without trace", lost(seconds=0.3)),
     Fault("one row in 10 lost, the time shows it", lost(share=0.1, traced=True)),
     Fault("one row in 50 written twice", twice(0.02)),
-    Fault("the reference in the place of the position", copied("position", "reference")),
-    Fault("the reference, in counts, in the place of the position", copied("position", "reference", counts=True)),
-    Fault("the position in the place of the reference", copied("reference", "position")),
+    Fault("the reference in the place of the position", copied("position", "reference"), "reference"),
+    Fault(
+        "the reference, in counts, in the place of the position",
+        copied("position", "reference", counts=True),
+        "reference",
+    ),
+    Fault("the position in the place of the reference", copied("reference", "position"), "reference"),
     Fault("a second half of another axis", other_half(1.6)),
     Fault("a second half with another gain of the effort", other_half(1.3, both=False)),
     Fault("a load put on in the middle", load_added(0.4)),

@@ -1,4 +1,4 @@
-"""Rows that cannot follow one another: spikes, jumps, rows lost or written twice without trace; columns that are copies.
+"""Rows that cannot follow one another: spikes, jumps, rows lost or twice without trace; columns that are copies.
 
 A position moves over a row by about as much as over the rows around it. What is off by far more, and comes back within
 a few rows, is a spike; what stays off is a jump: of a counter, of a coupling, or of the clock, where rows were lost. Of
@@ -20,6 +20,7 @@ BACK = 10  # rows of a spike, at most
 RETURNS = 0.3  # part of a spike that may be left of it when it is over
 BEYOND, SHORT = 1.0, 1  # by how much of its usual range spikes of an effort lie beyond it, and their rows, at most
 MOST = 0.02  # share of rows in spikes from which they are the signal
+NOISY, REPEATS = 0.02, 3  # share of rows equal to the one before below which a signal is noise, and zeros then too many
 FEWEST_LEVELS = 50  # numbers of an effort from which a zero between others is none of its levels
 CLEAR = 8.0  # usual way of a row, in grains, from which it tells whether rows are missing
 QUICK = 0.1  # and in the top speed: where moves meet, a reference may rest for a row
@@ -97,7 +98,8 @@ def _mend_position(draft: Draft, role: str) -> None:
     if spikes.any():
         draft.values[role] = _bridged(values, spikes)
         _tell_spikes(draft, role, spikes, float(off[places].max()))
-    jumps = [k for k in jumps if off[k] > FARTHER * usually]
+    # What a motion at the top speed of the log could be is no jump: a motor that starts between two slow samples.
+    jumps = [k for k in jumps if off[k] > max(FARTHER * usually, float(np.quantile(np.abs(ways), 0.98)))]
     if jumps:
         most = float(np.abs((ways - usual)[jumps]).max())
         text = f"jumps by up to {most:.3g} {draft.units[role]}, which no motion around it explains"
@@ -157,10 +159,12 @@ def _dropped(values: Values) -> Mask:
         return np.zeros(len(values), dtype=np.bool_)
     changes = np.abs(np.diff(values))
     usual = float(np.quantile(changes[changes > 0.0], 0.9))
+    is_noisy = float(np.mean(changes[~(none[1:] & none[:-1])] == 0.0)) < NOISY  # then 0 is no number that it repeats
     found = np.zeros(len(values), dtype=np.bool_)
     for first, last in runs_of(_short(none, BACK)).tolist():
         before, behind = float(values[max(first - 1, 0)]), float(values[min(last, len(values) - 1)])
-        found[first:last] = before * behind > 0.0 and min(abs(before), abs(behind)) > 4.0 * usual
+        is_far = before * behind > 0.0 and min(abs(before), abs(behind)) > 4.0 * usual
+        found[first:last] = is_far or (is_noisy and last - first >= REPEATS)
     return found
 
 

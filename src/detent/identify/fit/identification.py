@@ -31,6 +31,7 @@ from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals
 from detent.identify.fit.steadiness import changes_of, widen
 from detent.identify.fit.verdict import (
     Refusal,
+    compare_methods,
     look_at_constants,
     look_at_fit,
     look_at_log,
@@ -166,17 +167,24 @@ def identify(
     changes = changes_of(parts, fit)
     widen(fit, changes)
     constants = constants_of(fit, rivals)
-    if method == "output error" and constants.value("mass") > 0.0:
+    regressed, is_refined = constants, method == "output error" and constants.value("mass") > 0.0
+    if is_refined:
         constants = _refine(runs, constants, "output error", report)
     refusals += look_at_constants(runs[0], constants, parts)
-    refusals += look_at_fit(fit, chosen_climb(climbs).error, changes, runs[0])
+    refusals += look_at_fit(parts, fit, chosen_climb(climbs).error, changes)
     seen, horizons, closed = None, (), None
     if constants.value("mass") > 0.0:
         seen, horizons, closed = _test_simulation(runs, fit, chosen_rung(climbs), method, report)
+    believed = ""
+    if is_refined and seen is not None:
+        _, others, _ = _test_simulation(runs, fit, chosen_rung(climbs), "regression", report)
+        believed, told = compare_methods(runs[0], (regressed, constants), (others, horizons))
+        refusals += told
     refusals += [*look_at_prediction(climbs, horizons, refusals)]
     kernel, told = parts[0].motion.kernel, f"{runs[0].effort_name} [{runs[0].effort_unit}]"
     width = 2e3 * kernel.half * kernel.step
     notes = (f"effort: {told}", f"windows of {width:.3g} ms, {windows} of them", _WAYS[parts[0].instruments])
+    notes += (believed,) if believed else ()
     results = (constants, constants.estimates(runs[0]), climbs, fit, horizons, tuple(refusals), seen, closed, notes)
     return Identification(tuple(logs), runs, *results)
 

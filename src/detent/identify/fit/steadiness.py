@@ -23,6 +23,7 @@ from detent.logs.log import Values
 CHANCE = 2e-5  # probability of a change as clear by chance, in each direction, of one constant with one course
 ROWS_EACH = 8  # windows for each column, at least
 SLIGHT = 0.03  # change to each side, over the mass or in parts of the effort, up to which it only widens the limits
+SIDE = 0.15  # share of what tells a constant that each half of a log holds, at least
 STEPS = (0.0,)  # moments of a step, from -1 at the begin of a log to 1 at its end
 
 
@@ -46,6 +47,9 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
     found: dict[str, tuple[float, Change]] = {}
     for course, along in _courses(parts):
         for k, name in enumerate(terms):
+            power = x[:, k] ** 2
+            if not SIDE < float(power[along > 0.0].sum()) / max(float(power.sum()), 1e-300) < 1.0 - SIDE:
+                continue
             columns, tools = (np.column_stack([a, a[:, k] * along]) for a in (x, z))
             values = regression.solve(tools, columns, effort)
             residual = effort - regression.combine(columns, values)
