@@ -124,7 +124,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 # Keys of a rotary axis, of what is said about it, and of the host that runs it.
 ROTARY = {"axis.motion", "mechanics.pendulum", "method.feed_forward.model.pendulum"}
 SAID = {"hardware.id", "axis.name", "axis.method"}
-HOST = {"method.timeout"}
+HOST = {"method.timeout", "axis.creep"}
 
 GUARDED = {
     "limits.travel": "0.4 m",

@@ -90,6 +90,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 ELSEWHERE = (
     {
         "axis.name": "test_the_machine_does_not_know",
+        "axis.creep": "test_live.py, test 21",
         "axis.method": "tests/unit/methods/test_registry.py",
         "motor.max_current": "test_cautions.py: current of the largest drive word",
         "method.timeout": "test_rules.py: timeout; the jobs of the axis",

@@ -97,6 +97,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 ELSEWHERE = (
     {
         "axis.name": "test_the_machine_does_not_know",
+        "axis.creep": "test_live.py, test 21",
         "axis.method": "tests/unit/methods/test_registry.py",
         "motor.catalogue": "test_a_catalogue_motor_gives_its_constants",
         "motor.max_current": "test_cautions.py: current limit",

@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from tests.live_bench import Bench
 from tests.print_head_rig import EXAMPLE, TICK
 from tests.reference import reference_rows
 
@@ -95,6 +96,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 # Keys that are no matter of the machine, each with the test that holds them.
 ELSEWHERE = {
     "axis.name": "test_the_name_is_on_everything",
+    "axis.creep": "test_whoever_operates_it_is_told_how_fast_it_creeps",
     "axis.method": "test_there_is_one_method",
     "motor.max_current": "test_the_largest_current_is_warned_about",
 }
@@ -123,6 +125,11 @@ def test_a_key_changes_what_the_axis_does(key: str) -> None:
 
 def test_the_name_is_on_everything() -> None:
     assert read_axis(EXAMPLE, ["axis.name=left head"]).spec.axis.name == "left head"
+
+
+def test_whoever_operates_it_is_told_how_fast_it_creeps() -> None:
+    told = [Bench("print_head", *given).host.axis.live.operation.creep for given in ((), ("axis.creep=5 %",))]
+    assert told == [0.1, 0.05]
 
 
 def test_there_is_one_method() -> None:

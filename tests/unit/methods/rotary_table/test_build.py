@@ -108,8 +108,10 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 # Keys that are no matter of the machine, and where they are held.
 ELSEWHERE = {
     "axis.name": "test_the_machine_does_not_know",
+    "axis.creep": "test_live.py, test 21",
     "axis.method": "tests/unit/methods/test_registry.py",
     "detector.clock": "test_rules.py: clock; test_derive.py: conversions",
+    "hardware.id": "test_live.py, tests 29 and 32",
     "detector.coarse.reduction": "test_rules.py: it has one value that is right",
 } | dict.fromkeys(
     (f"protection.{key}" for key in TableProtectionTable.model_fields), "test_guard.py: what each of them sees"

@@ -94,6 +94,7 @@ CHANGES = {
 # Keys that are no matter of one motor, and where they are held.
 ELSEWHERE = {
     "axis.name": "test_the_motor_does_not_know",
+    "axis.creep": "test_live.py, test 21",
     "axis.method": "tests/unit/methods/test_registry.py",
     "motion": "test_rotary.py",
     **dict.fromkeys((f"home.{key}" for key in HomeTable.model_fields), "tests/unit/methods/test_homing.py"),
