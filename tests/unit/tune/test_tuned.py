@@ -116,6 +116,14 @@ def test_other_methods_are_tuned_and_tried(name, keys, tmp_path):
     assert list(told.values) == keys
     assert told.after is not None
     assert told.after.result.done
+    assert (
+        told.limited
+        == {
+            "rotary_table": "with more gain a stop from 60 deg/s passes its target by more than the window, 2 counts",
+            "filtered_servo": "the damping of its swing is 0.501",
+        }[name]
+    )
+    assert "The loops" in told.report(tmp_path / "tuned.html").read_text(encoding="utf-8")
     assert detent.load(told.save(tmp_path / "new.toml")).tune().values == told.values
 
 

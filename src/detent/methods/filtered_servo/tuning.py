@@ -13,6 +13,7 @@ from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.tuning import Bounds, Tuning, digits
 
 LEAST_DAMPING = 0.5
+CLOSE = 0.98  # of its bound, from which one decides
 LEAST_MARGIN = 2.0  # factor by which the gain of the axis may grow until the loop no longer settles
 PERIODS = (10.0, 5.0, 4.0, 2.5, 2.0, 1.25, 1.0, 0.5, 0.4, 0.25, 0.2, 0.125, 0.1)  # that are tried, times the file's
 HALVINGS = 30
@@ -91,6 +92,16 @@ class FilteredTuning(Tuning):
         method = {"sample_period": values[PERIOD], "scale": round(values[SCALE]), "coefficient": values[COEFFICIENT]}
         return [_level(FilteredFigures(plant.changed(method=method))) for plant in plants]
 
+    def limits(self, plant: FilteredServoSpec, values: Mapping[str, float], bounds: Bounds) -> str:
+        """Damping, or the stability margin."""
+        del bounds
+        method = {"sample_period": values[PERIOD], "scale": round(values[SCALE]), "coefficient": values[COEFFICIENT]}
+        figures = FilteredFigures(plant.changed(method=method))
+        damping, margin = _damping(figures), figures.gain_margin
+        found = [f"the damping of its swing is {damping:.3g}"] if damping <= LEAST_DAMPING / CLOSE else []
+        found += [f"its stability margin is {margin:.3g}"] if margin <= LEAST_MARGIN / CLOSE else []
+        return "; ".join(found)
+
     def worth(self, values: Mapping[str, float]) -> float:
         """How little a count of the speed moves the drive, 1/(A B)."""
         return 1.0 / (values[COEFFICIENT] * values[SCALE])
@@ -100,5 +111,10 @@ def _level(figures: Any) -> float:
     """The worse of both bounds: 1 is at the bound, infinite where the loop does not settle."""
     if not figures.loop.is_stable:
         return math.inf
+    return max(LEAST_DAMPING / max(_damping(figures), 1e-9), LEAST_MARGIN / figures.gain_margin)
+
+
+def _damping(figures: Any) -> float:
+    """Of the swing that decays least; 1 where nothing swings."""
     swings = [-pole.real / abs(pole) for pole in figures.loop.poles() if abs(pole.imag) > 1e-9 * abs(pole)]
-    return max(LEAST_DAMPING / max(min(swings, default=1.0), 1e-9), LEAST_MARGIN / figures.gain_margin)
+    return min(swings, default=1.0)

@@ -6,14 +6,21 @@ from collections.abc import Mapping, Sequence
 from detent.methods.rotary_table.derive import TableFigures
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.tuning import Bounds, Tuning, digits
+from detent.units import format_quantity
 
 HALVINGS = 40
 LEAST, MOST = 1e-4, 1.0  # gains that are looked at, times the strobe period
+MORE = 1.02  # times the gain, with which a bound is broken that decides
 KEY = "method.position_gain"
 
 
 RECORDINGS = {"steps of the speed word, with the speed": "droop time_constant"}
 """What would narrow an interval, and of which keys."""
+
+
+def _beyond(figures: TableFigures, spec: RotaryTableSpec) -> float:
+    """How far a stop from full speed passes its target, over the in-position window."""
+    return figures.overshoot(figures.speed) / (max(spec.method.in_position, 1) * spec.count)
 
 
 class TableTuning(Tuning):
@@ -52,9 +59,33 @@ class TableTuning(Tuning):
         if figures.loop.spectral_radius >= 1.0:
             return math.inf
         level = figures.loop.open_loop().margins().sensitivity / bounds.sensitivity
-        if level > 1.0:
-            return level
-        return max(level, figures.overshoot(figures.speed) / (max(spec.method.in_position, 1) * spec.count))
+        return level if level > 1.0 else max(level, _beyond(figures, spec))
+
+    def limits(self, plant: RotaryTableSpec, values: Mapping[str, float], bounds: Bounds) -> str:
+        """Ms, or how far a stop passes its target: what a little more gain would break."""
+        spec = plant.changed(method={"position_gain": MORE * values[KEY]})
+        figures, found = TableFigures(spec), list[str]()
+        m = figures.loop.open_loop().margins()
+        if m.sensitivity >= bounds.sensitivity:
+            found.append(f"Ms at the position is {bounds.sensitivity:.3g} at {format_quantity(m.peak, 'Hz', 3)}")
+        if _beyond(figures, spec) >= 1.0:
+            counts = max(spec.method.in_position, 1)
+            speed = format_quantity(figures.speed, "rad/s", 3)
+            found.append(
+                f"with more gain a stop from {speed} passes its target by more than the window, {counts} "
+                f"count{'s' if counts != 1 else ''}"
+            )
+        return "; ".join(found)
+
+    def easier(self, plant: RotaryTableSpec) -> list[tuple[str, RotaryTableSpec]]:
+        """A wider window, a quicker drive."""
+        counts = 2 * max(plant.method.in_position, 1)
+        constant = 0.5 * plant.drive.time_constant
+        return [
+            (f"a window of {counts} counts", plant.changed(method={"in_position": counts})),
+            (f"a drive with a time constant of {format_quantity(constant, 's', 3)}",
+             plant.changed(drive={"time_constant": constant})),
+        ]  # fmt: skip
 
     def worth(self, values: Mapping[str, float]) -> float:
         """Kp [1/s]."""
