@@ -22,10 +22,10 @@ BEYOND, SHORT = 1.0, 1  # by how much of its usual range spikes of an effort lie
 MOST = 0.02  # share of rows in spikes from which they are the signal
 NOISY, REPEATS = 0.02, 3  # share of rows equal to the one before below which a signal is noise, and zeros then too many
 FEWEST_LEVELS = 50  # numbers of an effort from which a zero between others is none of its levels
-CLEAR = 8.0  # usual way of a row, in grains, from which it tells whether rows are missing
+CLEAR = 16.0  # usual way of a row, in grains, from which it tells whether rows are missing
 QUICK = 0.1  # and in the top speed: where moves meet, a reference may rest for a row
-EVEN = 0.1  # spread of the ways around, in the usual one, up to which they do
-NEAR = 0.15  # distance of a way from a whole multiple of the usual one, in it
+EVEN = 0.05  # spread of the ways around, in the usual one, up to which they do
+NEAR = 0.06  # distance of a way from a whole multiple of the usual one, in it
 FEWEST_LOST = 3  # rows lost or twice from which the clock is wrong, and their share of the rows that can tell it
 SHARE_LOST = 5e-4
 COPIED = 0.51  # largest distance of a position from a reference, in counts, up to which it is a copy of it
@@ -159,7 +159,8 @@ def _dropped(values: Values) -> Mask:
         return np.zeros(len(values), dtype=np.bool_)
     changes = np.abs(np.diff(values))
     usual = float(np.quantile(changes[changes > 0.0], 0.9))
-    is_noisy = float(np.mean(changes[~(none[1:] & none[:-1])] == 0.0)) < NOISY  # then 0 is no number that it repeats
+    outside = changes[~(none[1:] & none[:-1])]
+    is_noisy = np.count_nonzero(outside) > (1.0 - NOISY) * len(outside)  # then 0 is no number that it repeats
     found = np.zeros(len(values), dtype=np.bool_)
     for first, last in runs_of(_short(none, BACK)).tolist():
         before, behind = float(values[max(first - 1, 0)]), float(values[min(last, len(values) - 1)])

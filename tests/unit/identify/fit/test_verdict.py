@@ -9,7 +9,14 @@ from detent.identify.fit.equations import make_kernel, make_run
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import RUNGS, Climb
 from detent.identify.fit.regression import prepare
-from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
+from detent.identify.fit.verdict import (
+    Refusal,
+    compare_methods,
+    look_at_constants,
+    look_at_log,
+    look_at_motion,
+    look_at_prediction,
+)
 from detent.logs.log import Action, Finding, Kind, Severity
 
 RUN = Recorder(seconds=6.0).run()
@@ -68,7 +75,7 @@ def test_signals_that_contradict_each_other_are_refused(kind, subject, advice):
 
 
 def test_what_the_import_mended_is_not_refused():
-    for kind in (Kind.SHIFTED, Kind.DROPPED_ROWS, Kind.WRAPPED_COUNTER, Kind.DUPLICATED_ROWS):
+    for kind in (Kind.SHIFTED, Kind.WRAPPED_COUNTER, Kind.DUPLICATED_ROWS):
         assert look(finding(kind, "position", [(1, 900)])) == []
 
 
@@ -264,8 +271,38 @@ def climb(error, *, taken=True):
     return Climb(RUNGS[1], error, np.full(8, error**2), 1.0, taken, possible=True, fit=None)
 
 
-def horizon(name, rms, naive):
-    return Horizon(0.5, name, 60, rms, 2 * rms, 1.0, naive)
+def horizon(name, rms, naive, moved=10.0):
+    return Horizon(0.5, name, 60, rms, 2 * rms, moved, naive)
+
+
+def test_a_simulation_far_off_its_travel_is_refused():
+    near = [horizon("0.5 s", 0.1, 1.0, 1.0), horizon("2 s", 0.2, 1.0, 1.0), horizon("free run", 0.7, 1.0, 1.0)]
+    assert [*look_at_prediction([climb(0.1)], near, [])] == []
+    for far in (
+        [*near[:2], horizon("free run", 0.82, 1.0, 1.0)],
+        [near[0], *(horizon(name, 0.5, 1.0, 1.0) for name in ("1 s", "2 s"))],
+    ):
+        (found,) = look_at_prediction([climb(0.1)], far, [])
+        assert (found.subject, found.constants) == ("simulation is far off", ())
+        assert "output-error" in found.record
+
+
+def constants(coulomb, error):
+    return Constants(("coulomb.positive",), np.array([coulomb]), np.array([[error**2]]), np.array([np.inf]), "made")
+
+
+def test_two_ways_that_disagree():
+    """The better predictor is believed, and said; where neither is better the constants are refused."""
+    ways = (constants(1.0, 0.1), constants(2.0, 0.1))
+    worse, better = [horizon("0.5 s", 0.5, 1.0, 1.0)], [horizon("0.5 s", 0.1, 1.0, 1.0)]
+    run = RUN
+    said, refused = compare_methods(run, ways, (worse, better))
+    assert refused == []
+    assert "coulomb.positive 1 +- 0.2 and 2 +- 0.2 N" in said
+    assert said.endswith("use it")
+    said, (refusal,) = compare_methods(run, ways, (better, worse))
+    assert (said, refusal.subject, refusal.constants) == ("", "two ways disagree", ("coulomb.positive",))
+    assert compare_methods(run, (ways[0], ways[0]), (better, worse)) == ("", [])
 
 
 def test_a_model_that_predicts_and_simulates_well_is_trusted():
