@@ -120,7 +120,8 @@ types: venv-dev ## pyright, strict on src
 imports: venv-dev ## do the rooms import downwards only?
 	$(BIN)/lint-imports
 
-docs: venv-dev ## build the documentation; a warning is an error
+docs: venv-dev ## build the documentation, pictures of the panel with it; a warning is an error
+	$(BIN)/python docs/pictures.py
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 	@! grep -rlE '<(script|img|link)[^>]*(src|href)="(https?:)?//' docs/_build/html --include='*.html' || { echo "these pages load something from the network" >&2; exit 1; }
 	@echo "Documentation: $(CURDIR)/docs/_build/html/index.html"

@@ -22,7 +22,7 @@ release = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 version = release
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
-PARTS = ("trust", "endurance", "feedback", "step-methods")  # tables that a page includes
+PARTS = ("trust", "fault", "endurance", "feedback", "step-methods")  # tables that a page includes
 exclude_patterns = ["_build", *(f"explanation/{part}-table.md" for part in PARTS)]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = False  # types of other packages are named in signatures, and their inventories need a network

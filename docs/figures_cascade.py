@@ -87,6 +87,43 @@ def which_encoder() -> None:
         areas[-1].set_xlabel("time since the reference ended [ms]")
 
 
+def _written(page: str, name: str) -> str:
+    """A file that a page of the instructions shows."""
+    from pathlib import Path
+
+    text = (Path(__file__).parent / "how-to" / page).read_text(encoding="utf-8")
+    return text.partition(f"<!-- file: {name} -->\n```toml\n")[2].partition("```")[0]
+
+
+def tuned() -> None:
+    """The loop and a push before and after `detent tune`, as its report draws them: of the page "Tune my axis"."""
+    import detent
+    from detent.page.draw import draw_figures
+    from detent.tune.page import tuned_page
+
+    by_ear = ["method.position_gain=40", "method.velocity_gain=100 V*s/m", "method.velocity_integral=5 kV/m"]
+    page = tuned_page(detent.load(detent.example("cascade.toml"), by_ear).tune())
+    draw_figures([one for one in page.figures if one.title in {"Cut at the command", "Push of 200 N"}],
+                 FOLDER / "tuned.png")  # fmt: skip
+
+
+def hunted() -> None:
+    """How the axis of the page "Will it hunt?" goes to and fro, and why, as the report of `detent hunt` draws it."""
+    import tempfile
+    from pathlib import Path
+
+    import detent
+    from detent.page.draw import draw_figures
+    from detent.tune.hunt_page import hunted_page
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "dry.toml")
+        file.write_text(_written("will-it-hunt.md", file.name), encoding="utf-8")
+        page = hunted_page(detent.load(file).hunt())
+    draw_figures([one for one in page.figures if one.title in {"The worst start", "From slip to slip"}],
+                 FOLDER / "hunted.png")  # fmt: skip
+
+
 def tolerance() -> None:
     """How a quantity of many machines spreads, and which of them fail, as the report of `detent tolerance` draws it."""
     import tempfile
@@ -97,8 +134,7 @@ def tolerance() -> None:
     from detent.tune.tolerance_page import tolerance_page
 
     # The file of the page "How many of a hundred machines will be good?".
-    page = (Path(__file__).parent / "how-to" / "how-many-are-good.md").read_text(encoding="utf-8")
-    entries = page.partition("<!-- file: tolerance.toml -->\n```toml\n")[2].partition("```")[0]
+    entries = _written("how-many-are-good.md", "tolerance.toml")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "slide.toml")
         file.write_text(
@@ -111,4 +147,4 @@ def tolerance() -> None:
     draw_figures(drawn[::-1], FOLDER / "tolerance.png")
 
 
-FIGURES = (feed_forward, profiles, which_encoder, tolerance)
+FIGURES = (feed_forward, profiles, which_encoder, tuned, hunted, tolerance)

@@ -15,8 +15,6 @@ from detent.control.phase_sequencer import count_pulses, hear_tracker
 from detent.control.pulse_generator import clock_generator, steer_rate
 from detent.control.step_rule import STEP, next_entry, next_step
 from detent.control.step_timer import load_period, pulse
-from detent.export.translate.program import Program
-from detent.export.translate.text import code_text, signals_text, struct_texts
 from detent.export.unit import ControlUnit, folded
 from detent.kernel.loop import i2_signal
 from detent.kernel.registers import Registers, i8, u1
@@ -31,6 +29,8 @@ from detent.sensing.counted_speed import add_pulses, close_window, filter_speed
 from detent.sensing.phase_converters import convert, count_carrier
 from detent.sensing.position_sensor import read_word, stand_sensor
 from detent.sensing.quadrature import clock_decoder
+from detent.translate.program import Program
+from detent.translate.text import code_text, signals_text, struct_texts
 
 # ---- cascade
 

@@ -9,6 +9,7 @@ from detent.kernel.step import bounded
 
 PLACES = 8
 WEIGHTS = (3, -1, 4)
+NEXT = (1, 2, 0, -5)
 UNKNOWN: Any = object()
 
 
@@ -68,6 +69,7 @@ def floats(p: Limits, r: State, a: int, b: int) -> float:
     x = a / 7.0 + p.gain * r.angle
     r.angle = min(max(x, -1e6), 1e6) - abs(x) / 3.0 + math.sqrt(1.0 * b * b)
     r.count = math.floor(x) + int(r.angle) + a
+    r.other = round(x) + round(b / 2.0) + a
     return -x if a > b else float(b)
 
 
@@ -81,7 +83,7 @@ def loops(p: Limits, r: State, a: int, b: int) -> None:
     r.place = (r.place + 1) % PLACES
     r.memory[r.place] = r.count >> p.shift
     if 0 <= a < PLACES:
-        r.other += r.memory[a]
+        r.other += r.memory[a] + NEXT[a & 3]
 
 
 @bounded(64, "halves 64 bits")

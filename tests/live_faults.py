@@ -183,7 +183,7 @@ class Rig:
                 self.axis.fault_numbers.get(given, given),
                 (notes.period[before % 16] - begun) * loop.period * 1e-9,
             )
-            reaction = self._reaction()
+            reaction = self.reaction()
         self.inject("nothing")
         if not code:
             self.host.stop()
@@ -210,7 +210,7 @@ class Rig:
             if abs(self.true_position - before) < 1e-7:
                 return
 
-    def _reaction(self) -> str:
+    def reaction(self) -> str:
         """As it is seen from outside: it rolls out without torque, or is led to rest and then let go, or held."""
         let_go = self.operation.demand.do == ops.REST_OFF
         for _ in range(2000):
@@ -300,8 +300,8 @@ def run(name: str) -> tuple[Cell, ...]:
     return tuple(rig(name).cell(*one) for one in cells(name))
 
 
-def page(found: list[Cell]) -> str:
-    """The page of the docs."""
+def page(found: list[Cell], beside: str) -> str:
+    """The page of the docs; `beside` is what `live_outside` has to tell."""
     named = [one for one in found if one.code]
     nothing, unseen = (sum(one.found == what for one in found) for what in ("nothing", "not seen"))
     trusted = [one for one in named if one.known and one.wrong]
@@ -329,7 +329,7 @@ def page(found: list[Cell]) -> str:
                 shown = f"{one.found} {one.seconds * 1e3:.0f} ms{'' if one.known else ' H'}" if one.code else one.found
                 rows.setdefault((one.place, one.kind), []).append(shown)
         text += [f"| {place} | {kind} | {' | '.join(row)} |" for (place, kind), row in rows.items()]
-    return "\n".join([*text, ""])
+    return "\n".join([*text, "", beside])
 
 
 HEADING = """# Faults injected: what comes of each
@@ -357,12 +357,16 @@ but as torque off where both came within a look.
 """
 RECOVERIES = {
     "A": "reset", "E": "mend, reset, enable", "H": "mend, reset, enable, find the reference", "C": "correct the file",
+    "S": "start detent live anew", "": "ask again",
 }  # fmt: skip
 
 
 def main() -> None:
     """Write the page."""
-    PAGE.write_text(page([one for name in FILES for one in run(name)]), "utf-8")
+    from tests import live_outside  # which stands on this rig
+
+    beside = live_outside.page([one for name in live_outside.EXAMPLES for one in live_outside.run(name)])
+    PAGE.write_text(page([one for name in FILES for one in run(name)], beside), "utf-8")
 
 
 if __name__ == "__main__":

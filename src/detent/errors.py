@@ -151,7 +151,7 @@ GUARD_TEXT: dict[int, str] = {
 
 
 # ---- faults of a live axis that no guard of a controller sees
-DRIVE_FAULT, DRIVE_LOST, LOOP_OVERRUN, LOOP_DEAD, OTHER_HARDWARE = 24, 40, 50, 51, 70
+DRIVE_FAULT, DRIVE_LOST, LOOP_OVERRUN, LOOP_DEAD, BROKEN, OTHER_HARDWARE = 24, 40, 50, 51, 54, 70
 SENSOR_LOST, OVER_CURRENT, MOTOR_LOAD = 1, 20, 21  # a drive has found them; of 1 and 21 a guard may know, too
 NO_MARK = 55  # refusal of a motion that a power cut would make a riddle of
 NOT_AT_REST, NOTHING_TO_UNDO = 111, 112  # refusals of what is asked of a position table
@@ -173,6 +173,8 @@ REFUSAL_TEXT: dict[int, str] = {
     "give it real-time priority, or a longer period",
     51: "the loop stood for longer than its watchdog waits, and the torque was taken away; look for what stopped the "
     "process, then reset",
+    54: "a part of the program beside the loop has ended in an error, and the axis is not enabled any more; keep the "
+    "report, end detent live, and start it anew",
     55: "that the axis is going to move cannot be kept, so no new motion may begin, for after a power cut nobody would "
     "know where it stands; give the store room on its disk, then enable again",
     52: "a value that is no number, infinite, or a share of the speed outside 0 to 1; correct it",

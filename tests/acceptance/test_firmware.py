@@ -1,33 +1,46 @@
 """Numbered tests of the firmware specification, as far as it is built: its control units, here and emulated."""
 
+import ast
 import csv
 import ctypes
+import importlib
 import json
 import os
+import pkgutil
 import re
 import resource
 import shutil
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
+from tests import firmware_steps
 from tests.bare_units import bare_code
 from tests.docs.pages import blocks_of
+from tests.firmware_steps import REFUSED
 
 import detent
+import detent.control
+import detent.drive
+from detent.control.step_rule import come_to_rest, follow, next_step, take_inputs
 from detent.errors import InputError
-from detent.export.code import FLAGS, WARNINGS, template
+from detent.export.code import FLAGS, PROCESSORS, WARNINGS, template
 from detent.export.linked import fill_addresses
 from detent.export.measure import Measured, measure
 from detent.export.show import shown
 from detent.export.teeth import mutants, reach
 from detent.export.unit import unit_named
 from detent.export.vectors import cut
-from detent.export.verify import TARGETS, left_out, verify
+from detent.export.verify import TARGETS, Target, left_out, verify
 from detent.export.write import export_firmware, read_manifest
+from detent.kernel.step import step as as_step
+from detent.methods.stepper_envelope.envelope_files import write_envelope_header
+from detent.translate.program import Program
+from detent.translate.values import RefusedError
 
 pytestmark = [pytest.mark.compiled, pytest.mark.process]
 JOBS = {
@@ -131,6 +144,22 @@ def test_01_02_03_the_whole_letter_is_equal(exported):
     proven(folder, "host-gcc", "cortex-m0", "cortex-m4", "rv32")
 
 
+def of_clang() -> Target:
+    """A Cortex-M4 whose code clang makes, without its floats; gcc's linker and library put it together."""
+    told = run("arm-none-eabi-gcc -E -Wp,-v -xc /dev/null", Path()).stderr.splitlines()
+    place = next(line.strip() for line in told if line.startswith(" ") and line.endswith("arm-none-eabi/include"))
+    flags = f"--target=thumbv7em-none-eabi -ffreestanding -isystem {place}"
+    return replace(TARGETS["cortex-m4"], name="clang-m4", compiler="clang", flags=flags, linker="arm-none-eabi-gcc",
+                   libraries=f"-mcpu=cortex-m4 -mthumb -nostartfiles {TARGETS['cortex-m4'].libraries}")  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ON_AVR)
+def test_05_clang_makes_an_arm_of_whole_numbers_the_same(exported, monkeypatch, method):
+    needs("cortex-m4", "host-clang")
+    monkeypatch.setitem(TARGETS, "clang-m4", of_clang())
+    proven(exported(method), "cortex-m4", "clang-m4")
+
+
 @pytest.mark.parametrize("method", ON_AVR)
 def test_08_whole_numbers_are_equal_where_an_int_has_16_bits(exported, method):
     """Of a longer export the first ticks are replayed, up to a check: those that have a place in its flash."""
@@ -179,6 +208,40 @@ def test_13_the_self_test_finds_fast_arithmetic(exported, tmp_path):
         assert (found != 0) == (wanted != 0), flags
 
 
+TOLD = """#include "NAME.h"
+int NAME_get(void);
+void NAME_put(char one);
+int NAME_replay(void);
+int NAME_replay(void)
+{
+    NAME_put((char)('0' + NAME_selftest()));
+    NAME_put('\\n');
+    return 0;
+}
+"""
+
+
+def test_13_the_self_test_finds_fused_arithmetic_and_the_replay_differs(exported, tmp_path, monkeypatch):
+    """GNU C of gcc fuses products and sums where a processor can."""
+    needs("cortex-m7")
+    place, name = copied(exported("cascade"), tmp_path / "out")
+    assert "2 products and sums are fused" in (place / f"{name}.h").read_text()
+    target = TARGETS["cortex-m7"]
+    (place / "self.c").write_text(TOLD.replace("NAME", name))
+    (place / "board.ld").write_text(template("board.ld.in", **target.memory))
+    for flags, wanted in ((FLAGS, "0"), ("-std=gnu99", "2")):
+        words = f"{target.compiler} {flags} -O2 -w {target.flags} -T board.ld -Wl,-e,Start self.c {name}.c board.c"
+        made = run(words, place, f'-DVECTORS="{place / "vectors/job.vec"}"', "-o", "job", *target.libraries.split())
+        assert made.returncode == 0, made.stderr
+        semihosting = "-nographic -monitor none -serial none -semihosting-config enable=on,target=native"
+        told = run(f"{target.emulator} {target.machine} {semihosting} -kernel job", place)
+        assert (told.stdout + told.stderr).split()[0] == wanted
+    monkeypatch.setattr("detent.export.verify.FLAGS", "-std=gnu99")
+    (one,) = verify(exported("cascade"), ["cortex-m7"])
+    assert not one.equal
+    assert "differs in" in one.told
+
+
 def test_14_a_constant_changed_by_hand_is_found_with_tick_and_register(exported, tmp_path):
     place, name = copied(exported("cascade"), tmp_path / "out")
     code = (place / f"{name}.c").read_text()
@@ -210,13 +273,106 @@ def test_17_a_bit_of_the_vectors_flipped_is_found_wherever_it_is(exported, tmp_p
         assert done.returncode in (1, 2), (k, done.stdout, done.stderr[:300])
 
 
-def test_21_nothing_is_written_that_is_not_handed_over(exported, tmp_path):
-    place, name = copied(exported("cascade"), tmp_path / "out")
-    assert run(f"gcc {FLAGS} -Os -c {name}.c -o unit.o", place).returncode == 0
-    sections = {row.split()[0]: int(row.split()[1]) for row in run("size -A unit.o", place).stdout.splitlines()[2:-2]}
+DIVISION = {f"__aeabi_{one}" for one in ("ldivmod", "uldivmod", "lmul", "llsl", "llsr", "lasr", "idiv", "uidiv")}
+DOUBLES = re.compile(r"__aeabi_(d\w+|cd\w+|cfrcmple|i2d|ui2d|l2d|ul2d|f2d)")
+
+
+def needed_by(place: Path, name: str, tools: str, flags: str) -> set[str]:
+    """What NAME.o takes from elsewhere, without its own tables; it holds nothing that is written."""
+    assert run(f"{tools}gcc {FLAGS} {flags} -Os -c {name}.c -o unit.o", place).returncode == 0
+    told = run(f"{tools}size -A unit.o", place).stdout.splitlines()[2:-2]
+    sections = {row.split()[0]: int(row.split()[1]) for row in told}
     assert (sections.get(".data", 0), sections.get(".bss", 0)) == (0, 0)
-    undefined = {row.split()[-1] for row in run("nm -u unit.o", place).stdout.splitlines()}
-    assert undefined <= {"memcpy", "memset", "sqrt", "__stack_chk_fail", "_GLOBAL_OFFSET_TABLE_"}
+    undefined = {row.split()[-1] for row in run(f"{tools}nm -u unit.o", place).stdout.splitlines()}
+    return {one for one in undefined if not one.startswith(f"{name}_")}
+
+
+@pytest.mark.parametrize("method", ["cascade", *ON_AVR, *(pytest.param(m, marks=pytest.mark.wide) for m in
+                                    ("filtered_servo", "rotary_table", "print_head"))])  # fmt: skip
+def test_21_nothing_is_written_and_little_is_taken_from_a_library(exported, tmp_path, method):
+    needs("cortex-m4")
+    place, name = copied(exported(method), tmp_path / "out")
+    here = needed_by(place, name, "", "")
+    assert here <= {"memcpy", "memset", "sqrt", "__stack_chk_fail", "_GLOBAL_OFFSET_TABLE_"}
+    there = needed_by(place, name, "arm-none-eabi-", PROCESSORS["cortex-m4"])
+    floats = "f8" in {row["width"] for table in ("params.csv", "registers.csv") for row in rows(place / table)}
+    assert floats == (method not in ON_AVR)
+    allowed = {"memcpy", "memset", "sqrt"} if floats else set()
+    assert {one for one in there - DIVISION - allowed if not (floats and DOUBLES.fullmatch(one))} == set()
+
+
+LANGUAGE = re.compile(
+    r"_((floor_div|floor_mod|shift_right|abs|min|max|wrap)_\w+|to_i64|floor|power_of_two|bits_of|claimed|check_params"
+    r"|selftest)$"
+)
+"""What is no step: an operator of Python, and the two questions about a set of parameters and a build."""
+
+
+@pytest.mark.parametrize(
+    "method", ["cascade", "phase_servo", "zoom", pytest.param("print_head", marks=pytest.mark.wide)]
+)
+def test_23_every_function_has_a_row_that_leads_to_its_step(exported, method):
+    folder = exported(method)
+    name = read_manifest(folder)["name"]
+    code = (folder / f"{name}.c").read_text().splitlines()
+    heads = {k: found[1] for k, line in enumerate(code, 1) if code[k:k + 1] == ["{"]
+             and (found := re.fullmatch(r"(?:static )?\w+ \*?(\w+)\(.*\)", line))}  # fmt: skip
+    steps = {k: one for k, one in heads.items() if not LANGUAGE.search(one)}
+    traced = rows(folder / "trace.csv")
+    assert len(traced) == len({row["function"] for row in traced}) > 20
+    assert {int(row["line"]): row["function"] for row in traced} == steps
+    for row in traced:
+        file = Path(detent.__file__).parents[1] / row["file"]
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        (step,) = (one for one in tree.body if getattr(one, "lineno", 0) == int(row["python_line"]))
+        assert isinstance(step, ast.FunctionDef)
+        assert step.name == row["step"]
+        begin = max(k for k in range(int(row["line"])) if code[k].startswith("/* "))
+        assert code[begin] == f"/* {row['file']}:{row['python_line']} {row['step']}"
+        comment = [line.removeprefix(" *").removeprefix(" ") for line in code[begin + 2 : int(row["line"]) - 2]]
+        assert "\n".join(comment) == ast.get_docstring(step)
+
+
+ROOMS = (detent.control, detent.drive)
+LIVE = {"detent.control.step_table.move_stop"}  # writes the tables of a live stepper, where these stand
+
+
+def steps_of(*modules):
+    """Every step of these modules, as a plain function."""
+    for module in modules:
+        for one in vars(module).values():
+            step = getattr(one, "py_func", None)
+            if step is not None and step.__module__ == module.__name__:
+                yield step
+
+
+def test_25_the_language_takes_every_step_of_the_control_rooms():
+    """Alone, a step may miss a range that its unit gives it (FW08, FW09): that is no matter of the language."""
+    names = [f"{room.__name__}.{one.name}" for room in ROOMS for one in pkgutil.iter_modules(room.__path__)]
+    refused, count = {}, 0
+    for step in steps_of(*map(importlib.import_module, names)):
+        count += 1
+        try:
+            Program("t", {f"t_{step.__name__}": step})
+        except RefusedError as one:
+            if one.code not in ("FW08", "FW09"):
+                refused[f"{step.__module__}.{step.__name__}"] = str(one)
+    assert count > 150
+    assert {name: told for name, told in refused.items() if name not in LIVE} == {}
+
+
+def test_25_thirty_steps_outside_the_language_are_refused_with_file_line_and_code(monkeypatch):
+    for one in (*firmware_steps.STEPS, firmware_steps.recursion):
+        monkeypatch.setattr(firmware_steps, one.__name__, as_step(one))
+    assert len(REFUSED) >= 30
+    for step, code in REFUSED.items():
+        with pytest.raises(RefusedError) as caught:
+            Program("t", {"t_one": step}, firmware_steps.Limits)
+        first = step.__code__.co_firstlineno
+        place = re.match(r"firmware_steps\.py:(\d+): |tests\.firmware_steps\.(\w+): ", str(caught.value))
+        assert place is not None, step.__name__
+        assert place[2] == step.__name__ or first <= int(place[1] or 0) <= first + 8, (step.__name__, str(caught.value))
+        assert (caught.value.code, f": {code}: " in str(caught.value)) == (code, True)
 
 
 def test_23_the_code_is_c_plus_plus_too(exported, tmp_path):
@@ -707,3 +863,41 @@ def test_30_a_program_of_60_lines_drives_the_cascade_to_the_bit_of_the_simulatio
     assert (told.returncode, done.returncode, done.stderr) == (0, 0, "")
     assert told.stdout == done.stdout  # 17 digits tell every bit
     assert float(told.stdout.split()[0]) == pytest.approx(0.06, abs=1e-6)  # in its place
+
+
+BEFORE_33 = {
+    "group_a": (12_572, 13_148),
+    "group_b": (9_484, 10_060),
+    "x": (3_762, 4_340),
+    "y": (4_740, 5_318),
+    "table": (10_322, 10_896),
+    "lift": (6_408, 6_986),
+}
+"""Flash of the packaged motors with the rule as it was written by hand [byte], at -Os: Cortex-M4, ATmega1284P."""
+MOTOR_FILES = {"group_a": "zoom", "group_b": "zoom", "x": "stage", "y": "stage", "table": "photo_table",
+               "lift": "photo_table"}  # fmt: skip
+
+
+@pytest.mark.parametrize("motor", BEFORE_33)
+def test_33_the_envelopes_header_is_translated_and_hardly_larger(tmp_path, motor):
+    """Its other tests are those of before (tests/unit/methods/stepper_envelope/test_envelope_*.py)."""
+    tables = detent.load(detent.example(f"{MOTOR_FILES[motor]}.toml")).envelopes()[motor].tables
+    write_envelope_header(tables, tmp_path / "motor.h")
+    text = (tmp_path / "motor.h").read_text()
+    for one in (next_step, follow, take_inputs, come_to_rest):
+        assert f"step_rule.py:{getattr(one, 'py_func', one).__code__.co_firstlineno + 1} {one.__name__}\n" in text
+    calls = {"next": "", "place": ", 7", "start": ", 1, 0", "deflect": ", 7, 1"}
+    head = f"void u_KEY({motor}_registers *m)"
+    lines = [f"{head};\n{head} {{ {motor}_KEY(m{given}); }}\n".replace("KEY", key) for key, given in calls.items()]
+    unit = "".join(lines)
+    (tmp_path / "unit.c").write_text(f'#include "motor.h"\n{unit}')
+    found = []
+    for tools, flags in (("arm-none-eabi-", PROCESSORS["cortex-m4"]), ("avr-", "-mmcu=atmega1284p")):
+        if not shutil.which(f"{tools}gcc"):
+            pytest.skip(f"not installed: {tools}gcc")
+        made = run(f"{tools}gcc -std=gnu99 -Os {flags} -c unit.c -o unit.o", tmp_path)
+        assert made.returncode == 0, made.stderr
+        sizes = run(f"{tools}size unit.o", tmp_path).stdout.splitlines()[1].split()
+        found.append(int(sizes[0]) + int(sizes[1]))
+    for now, before in zip(found, BEFORE_33[motor], strict=True):
+        assert 0.9 * before < now <= 1.05 * before, (found, BEFORE_33[motor])

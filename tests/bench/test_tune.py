@@ -16,6 +16,7 @@ from tests.tolerance_rig import SHORT, SLIDE, asked, quick
 import detent
 from detent.methods.cascade.batch import build_many, doubtful, ready
 from detent.methods.moves.job import one_move
+from detent.methods.registry import METHODS
 from detent.tune import workers
 from detent.tune.batch import run_chunk
 from detent.tune.cases import draw
@@ -27,6 +28,7 @@ BUILD_BAR = 1.0e-4  # a variant, checks included: 10 s for 100,000
 MEMORY_BAR = 500e6  # of 100,000 cases [byte]
 DASK_BAR = 0.030  # a chunk of 1000 cases beyond its computation
 TUNE_BARS = {"": 8.0, SLIDE: 20.0}
+MARGIN_BAR = 20e-3  # of all three cuts of a case, each crossing and peak looked at closer
 HUNT_BARS = 4.0, 20.0  # median, worst
 CHECK_BAR = 1.0  # of the row of `detent check`
 HELP_BAR = 0.03  # more than that of `detent check`
@@ -120,6 +122,13 @@ def test_gains(benchmark, tmp_path, table):
     file.write_text((EXAMPLES / "cascade.toml").read_text(encoding="utf-8") + table, encoding="utf-8")
     took = held(benchmark, lambda: detent.load(file).tune(), rounds=1)
     assert benchmark.disabled or took <= TUNE_BARS[table]
+
+
+def test_margins_of_a_case(benchmark):
+    spec, linear = detent.load(EXAMPLES / "cascade.toml").spec, METHODS["cascade"].linear
+    took = held(benchmark, lambda: [linear(spec).margins for _ in range(20)]) / 20
+    benchmark.extra_info["ms per case"] = 1e3 * took
+    assert benchmark.disabled or took <= MARGIN_BAR
 
 
 def test_forecasts_of_hunting(benchmark):

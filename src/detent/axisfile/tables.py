@@ -18,6 +18,7 @@ from detent.files.quantities import (
     Inertia,
     Length,
     Mass,
+    Percentage,
     Resistance,
     Time,
     TorqueConstant,
@@ -37,6 +38,9 @@ class AxisTable(Table, frozen=True):
         max_length=80,
     )
     method: str
+    creep: Percentage = optional(
+        "live: share of the largest speed at which it creeps while its position is not known", 0.1, gt=0.0, le=1.0
+    )
 
 
 class HardwareTable(Table, frozen=True):

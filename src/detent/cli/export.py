@@ -59,12 +59,18 @@ def firmware(
 ) -> None:
     """Write the controller of an axis as C99, with golden vectors of a simulated job.
 
-    Exit status: 0 written, 1 refused (FW01 to FW13: why, and what to do), 2 wrong input.
+    Exit status: 0 written, 1 refused (FW01 to FW15: why, and what to do), 2 wrong input.
     """
     from detent.axis import load
+    from detent.errors import InputError
     from detent.export.write import export_firmware
+    from detent.translate.values import RefusedError
 
-    axis = load(file, overrides or [])
+    try:
+        axis = load(file, overrides or [])
+    except InputError as error:
+        got, remedy = f"an axis that fails detent check\n{error}", "what these findings say"
+        raise RefusedError("FW11", None, got, "one without findings", remedy) from error
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "simulating the job, translating the controller")
         made = export_firmware(

@@ -297,12 +297,16 @@ def _show_positions(table: list[dict[str, Any]], unit: str, *, as_json: bool) ->
         tell("No positions yet; teach the first one with: detent connect FILE teach 1")
 
 
-def _do_job(axis: Any, path: str | None, speed: float) -> dict[str, Any]:
-    """Lead a job to its end; Ctrl-C stops it."""
-    if path is None:
-        raise DetentError("connect: got a job without a file; expected: one such as moves.csv; name it")
+def _do_job(axis: Any, what: str | None, speed: float) -> dict[str, Any]:
+    """Lead a job to its end: a file, or places with commas between them; Ctrl-C stops it."""
+    if what is None:
+        raise DetentError(
+            'connect: got a job without moves; expected: a file, or places such as "left, 20 mm"; name them'
+        )
+    is_file = Path(what).exists() or ("," not in what and "." in what)
     try:
-        return axis.run_job(path, speed=speed, wait=False).wait().to_dict()
+        job = what if is_file else [one.strip() for one in what.split(",")]
+        return axis.run_job(job, speed=speed, wait=False).wait().to_dict()
     except KeyboardInterrupt:
         axis.stop()
         raise

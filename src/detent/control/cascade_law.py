@@ -105,15 +105,17 @@ def feed_forward(p: FeedForwardParams, ref: CascadeReference) -> float:
 
 @step
 def limit_command(p: CascadeLawParams, r: CascadeLaw, rest: float, increment: float) -> None:
-    """Command of the integral, its `increment` [V] and the `rest` [V], without windup."""
+    """Command of the integral, its `increment` [V] and the `rest` [V], without windup; what is no number stays none."""
     command = rest + r.integral + increment
     r.limited = 1 if abs(command) > p.max_command else 0
     if command > p.max_command:
         increment = min(increment, max(p.max_command - rest - r.integral, 0.0))
+        command = p.max_command
     elif command < -p.max_command:
         increment = max(increment, min(-p.max_command - rest - r.integral, 0.0))
+        command = -p.max_command
     r.integral += increment
-    r.command = min(max(command, -p.max_command), p.max_command)
+    r.command = command
 
 
 @step

@@ -128,7 +128,9 @@ def back_off(p: HomingParams, r: Homing, s: Seen) -> int:
     """On the way back, from where the reference was seen or off a switch on which it began."""
     on = p.way != CONTACT and s.switch
     if r.phase == CLEAR and on:
-        return fail(r, ACTIVE) if abs(s.position - r.begin) > p.longest or is_held(p, r, s) else ON
+        if abs(s.position - r.begin) > p.longest or is_held(p, r, s):
+            return fail(r, ACTIVE)
+        return ON
     if r.phase == CLEAR:
         r.latched = s.position
         return go(r, s, BACK, r.velocity)
@@ -150,7 +152,9 @@ def look_for_mark(p: HomingParams, r: Homing, s: Seen) -> int:
         return HALT
     elif abs(s.position - r.begin) > p.pitch:
         return fail(r, INDEX_FAR)
-    return fail(r, NOT_CLEARED) if is_held(p, r, s) else ON
+    if is_held(p, r, s):
+        return fail(r, NOT_CLEARED)
+    return ON
 
 
 @step

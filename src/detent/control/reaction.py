@@ -16,7 +16,8 @@ class Rule(NamedTuple):
     """Of a fault."""
 
     reaction: int
-    recovery: str  # A reset; E mend, reset, enable; H as E, and find the reference anew; C correct the file; "" none
+    # A reset; E mend, reset, enable; H as E, and find the reference anew; C correct the file; S start anew; "" none
+    recovery: str
 
 
 RULES = {
@@ -28,7 +29,7 @@ RULES = {
     30: Rule(RAMP_HOLD, "A"), 31: Rule(REFUSE, ""), 32: Rule(RAMP_HOLD, "A"), 33: Rule(RAMP_OFF, "E"),
     34: Rule(RAMP_HOLD, "H"), 35: Rule(REFUSE, "H"),
     40: Rule(TORQUE_OFF, "E"), 41: Rule(RAMP_HOLD, ""), 43: Rule(REFUSE, ""), 44: Rule(REFUSE, ""),
-    50: Rule(RAMP_HOLD, "A"), 51: Rule(TORQUE_OFF, "E"), 52: Rule(TORQUE_OFF, "E"), 54: Rule(RAMP_OFF, "E"),
+    50: Rule(RAMP_HOLD, "A"), 51: Rule(TORQUE_OFF, "E"), 52: Rule(TORQUE_OFF, "E"), 54: Rule(RAMP_OFF, "S"),
     55: Rule(WARN, "A"),
     60: Rule(REFUSE, "C"), 61: Rule(REFUSE, ""), 62: Rule(REFUSE, "H"), 63: Rule(WARN, "A"), 64: Rule(REFUSE, "H"),
     65: Rule(REFUSE, "H"), 66: Rule(REFUSE, "C"), 67: Rule(REFUSE, "H"),

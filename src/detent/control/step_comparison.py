@@ -8,7 +8,7 @@ import math
 
 from detent.control.step_rule import ACCEL, CRUISE, DECEL, IDLE, REST, STEP, StepRule
 from detent.kernel.registers import Registers, f8, f8_array, i8, i8_array, register, u1
-from detent.kernel.step import hot_step
+from detent.kernel.step import bounded, hot_step
 
 BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY, CONSTANT_FREQUENCY = 1, 2, 3  # conventional A, conventional B, the naive drive
 ZONES = 33
@@ -42,6 +42,7 @@ def braking_steps(p: ComparisonParams, hz: float) -> float:
 
 
 @hot_step
+@bounded(ZONES, "passes one stretch per turn")
 def zone_limit(p: ComparisonParams, c: Comparison, made: int) -> float:
     """Limit of the step number `made`; the stretches are passed in order."""
     while c.zone < p.zones - 1 and made >= p.edge[c.zone]:

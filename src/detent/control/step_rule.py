@@ -82,31 +82,37 @@ def compare_words(p: StepRuleParams, present: int, permissible: int) -> int:
 
 
 @hot_step
-def follow(r: StepRule, permissible: int, goal: int) -> None:
-    """One index up, none or one down, towards `goal`; that must reach `permissible` when it falls.
+def follow(r: StepRule, permissible: int, goal: int) -> int:
+    """One index up, none or one down, towards `goal`; that must reach `permissible` when it falls. The new one.
 
     Three-way comparison and increment: with the table read, the whole cost of a step.
     """
-    if r.index == goal:
+    index = r.index
+    if index == goal:
         r.relation, r.state = 0, CRUISE
-    elif r.index < goal:
-        r.index += 1
+        return index
+    if index < goal:
         r.relation, r.state = -1, ACCEL
-    else:
-        r.index -= 1
-        r.relation, r.state = 1, DECEL if r.state != FAULT else FAULT
-        if r.index > permissible and r.state != FAULT:
+        r.index = index + 1
+        return r.index
+    r.index = index - 1
+    r.relation = 1
+    if r.state != FAULT:
+        r.state = DECEL
+        if r.index > permissible:
             r.state, r.cause = FAULT, INFEASIBLE
+    return r.index
 
 
 @hot_step
-def follow_literally(p: StepRuleParams, r: StepRule, entry: int, goal: int) -> None:
-    """The claim's rule: the frequency becomes that of the entry, by however much that is."""
+def follow_literally(p: StepRuleParams, r: StepRule, entry: int, goal: int) -> int:
+    """The claim's rule: the frequency becomes that of the entry, by however much that is. The new index."""
     r.relation = compare_words(p, r.word, entry_word(p, entry))
     r.state = CRUISE
     if r.relation:
         r.state = ACCEL if r.relation < 0 else DECEL
     r.index = goal
+    return r.index
 
 
 @hot_step
@@ -114,9 +120,9 @@ def wanted_index(r: StepRule, permissible: int) -> int:
     """Ramp index to go for: what the table allows, what the operator asks for, or rest."""
     if r.state == FAULT or r.heading != r.direction:
         return AT_REST
-    if r.manual:
-        return min(permissible, r.request)
-    return permissible if r.active else AT_REST
+    if r.active:  # never under the operator's hand
+        return permissible
+    return min(permissible, r.request) if r.manual else AT_REST
 
 
 @hot_step
@@ -168,8 +174,8 @@ def next_entry(r: StepRule, up: i2_signal, down: i2_signal) -> int:
     """Entry of the next step, read while the present one runs; no other step of the rule takes the tables."""
     if not (0 <= r.position < len(up) and r.position < len(down)):
         return OUTSIDE
-    direction = r.heading if r.index < 0 else r.direction
-    return int((up if direction > 0 else down)[r.position])
+    forward = (r.heading if r.index < 0 else r.direction) > 0
+    return int((up if forward else down)[r.position])
 
 
 @hot_step
@@ -182,15 +188,19 @@ def next_step(p: StepRuleParams, r: StepRule, entry: int) -> int:
     permissible = entry & p.index_mask if entry >= 0 else AT_REST
     goal = wanted_index(r, permissible)
     moved = r.index >= 0
-    if p.literal:
-        follow_literally(p, r, entry, goal)
+    if p.literal:  # noqa: SIM108 - both write: C has no order for such effects in a choice
+        index = follow_literally(p, r, entry, goal)
     else:
-        follow(r, permissible, goal)
-    if r.index < 0:
+        index = follow(r, permissible, goal)
+    if index < 0:
         return come_to_rest(r, permissible, moved)
-    r.word = p.ramp[r.index] if entry < 0 else slower(p, p.ramp[r.index], p.limit[entry >> p.zone_shift])
-    if r.manual and r.index == r.request:
-        r.word = slower(p, r.word, r.request_word)
+    permitted = p.ramp[index]
+    if entry >= 0:
+        permitted = slower(p, permitted, p.limit[entry >> p.zone_shift])
+    word = permitted
+    if r.manual and index == r.request and compare_words(p, r.request_word, permitted) < 0:
+        word = r.request_word
+    r.word = word
     r.position += r.direction
     return STEP
 

@@ -14,12 +14,12 @@ from jinja2 import Environment, StrictUndefined
 
 from detent import __version__
 from detent.export.drawn import FAR, PLACES, SEED, Chance, Row, drawn_from
-from detent.export.translate.program import Function, Program
-from detent.export.translate.text import code_text, comment_of, signals_text, struct_texts
-from detent.export.translate.values import Value, c_field, interval_of, number, type_of_local
 from detent.export.unit import LARGE, ControlUnit, every, members
 from detent.export.vectors import Golden
 from detent.kernel.registers import Field, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
+from detent.translate.program import Function, Program
+from detent.translate.text import code_text, comment_of, signals_text, struct_texts
+from detent.translate.values import Value, c_field, interval_of, number, type_of_local
 
 FLAGS = "-std=c99 -ffp-contract=off"
 PROCESSORS = {

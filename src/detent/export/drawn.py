@@ -29,14 +29,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.export.translate.program import Function, Program
-from detent.export.translate.values import Value, interval_of
 from detent.export.unit import LARGE, ControlUnit
 from detent.kernel.compiled import bits_of
 from detent.kernel.draws import Draws, Ends, Places, add_image, draw, draw_into, draw_real, draw_whole, misuse
 from detent.kernel.image import WHOLE, add_bytes, begin_hash
 from detent.kernel.loop import HostArray
 from detent.kernel.registers import PLANT, Leaf, Registers, Width
+from detent.translate.program import Function, Program
+from detent.translate.values import Value, interval_of
 
 MAGIC, VERSION = b"DTNR", 1
 END, FUNCTION, MISUSE, STRETCH = range(4)

@@ -14,11 +14,11 @@ from typing import Any, get_args
 
 from detent.axis import Axis
 from detent.errors import DetentError
-from detent.export.translate.program import Program
-from detent.export.translate.values import C_WORDS, RefusedError, Shape, Table
 from detent.kernel.loop import control_of
 from detent.kernel.registers import Field, Leaf, Registers, Width
 from detent.methods.registry import METHODS
+from detent.translate.program import Program
+from detent.translate.values import C_WORDS, RefusedError, Shape, Table
 
 NARROW = ("avr",)  # targets whose double is not IEEE binary64
 LARGE = 64  # elements of an array that enters the hash of every 1000th tick only if it has more

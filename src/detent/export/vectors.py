@@ -32,6 +32,7 @@ from detent.export.unit import LARGE, ControlUnit, signal_widths
 from detent.kernel.image import add_bytes, add_rows, begin_hash
 from detent.kernel.loop import Bytes
 from detent.kernel.registers import PLANT, Leaf, Registers
+from detent.translate.values import RefusedError
 
 MAGIC, VERSION = b"DTNV", 2
 END, WRITE, TICKS, CHECK, SIGNAL, CALL, EXCHANGE = range(7)
@@ -144,10 +145,9 @@ class Golden:
         for k in self._inside:
             at = slice(self._offsets[k], self._offsets[k] + _size(self._leaves[k]))
             if self._known[at] != now[at]:
-                raise DetentError(
-                    f"{self.unit.name}: got {self._leaves[k].path}, written by a host from outside; expected: a step "
-                    "of the controller that writes it; name that in `actions` of the method, and call it by `act`"
-                )
+                got = f"a job in which {self.unit.name}: {self._leaves[k].path} is written by a host from outside"
+                remedy = "a job without it; or a step that writes it, in `actions` of the method, called by `act`"
+                raise RefusedError("FW15", None, got, "steps of the controller alone that write there", remedy)
         for k in self._wires:
             at = slice(self._offsets[k], self._offsets[k] + _size(self._leaves[k]))
             self._write(k, self._known[at], now[at])

@@ -18,10 +18,10 @@ from detent.axis import Axis
 from detent.errors import DetentError
 from detent.export.code import FLAGS, PROCESSORS, WARNINGS, short_hash, template
 from detent.export.drawn import Chance, Row
-from detent.export.translate.values import RefusedError
 from detent.export.unit import refuse_floats, unit_named
 from detent.export.vectors import cut
 from detent.export.write import changed_files, export_firmware, manifest_of
+from detent.translate.values import RefusedError
 
 TIMEOUT = 600.0  # of one replay [s]
 TOLD = 20  # registers that are told of a difference
@@ -50,6 +50,7 @@ class Target:
     share: int = 1  # of the random calls and ticks one in so many is done; 0: none, it has no room for them
     most: int = 0  # ticks of the job; 0: all
     warnings: str = WARNINGS
+    linker: str = ""  # where it is not the compiler
 
     @property
     def missing(self) -> str:
@@ -220,7 +221,7 @@ def link(work: Path, target: Target, level: str, program: str, parts: Sequence[s
         more = ["-T", "board.ld", "-Wl,-e," + ("entry_" if target.name == "rv32" else "Start")]
     tables = ["tables"] if (work / "tables.o").is_file() else []
     objects = [f"{part}.o" for part in (*parts, *tables, "params", "image")]
-    command = [target.compiler, *level.split(), *target.flags.split(), *more]
+    command = [target.linker or target.compiler, *level.split(), *target.flags.split(), *more]
     return run_tool([*command, *objects, "-o", program, *target.libraries.split()], work)
 
 

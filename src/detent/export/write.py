@@ -25,12 +25,12 @@ from detent.export.code import (
 )
 from detent.export.drawn import FILES, ROUNDS, Chance, drawn_vectors
 from detent.export.serial import serial_texts
-from detent.export.translate.program import Function, Program
-from detent.export.translate.values import RefusedError
 from detent.export.unit import ControlUnit, options_of, outside_ranges, refuse_floats, unit_of
 from detent.export.vectors import FORMATS, Golden, record
 from detent.files.text import write_errors
 from detent.methods.check import check_spec
+from detent.translate.program import Function, Program
+from detent.translate.values import RefusedError
 
 MANIFEST = "manifest.json"
 TICKS = 1_000_000  # of the golden run at most

@@ -12,6 +12,7 @@ from detent.files.text import kind_of, short
 from detent.logs.agreement import find_disagreements
 from detent.logs.choose import choose_columns, make_draft
 from detent.logs.effort import find_shifts, find_wrong_effort
+from detent.logs.jumps import find_copies, mend_jumps
 from detent.logs.log import Action, Draft, Finding, Kind, Log, Severity, row_ranges, tell_count
 from detent.logs.mapping import ColumnMapping, FileOptions, load_mapping, parse_options
 from detent.logs.raw_table import RawTable
@@ -84,6 +85,8 @@ def clean(draft: Draft) -> None:
     draft.convert()
     take_out_delays(draft)
     look_at_clock(draft)
+    mend_jumps(draft)
+    find_copies(draft)
     find_stuck(draft)
     find_saturation(draft)
     find_disagreements(draft)

@@ -163,6 +163,7 @@ class Wiring:
     zero: str = ""  # of a position demand: the position of count 0 [m]
     effort: str = ""  # takes what the loops of the drive give, where `torque` says how much that is; none where not
     samples: str = ""  # takes the number of samples that were heard of; none where nobody asks
+    turn_key: str = "encoder.resolution or mechanics.travel_per_revolution"  # what in the axis file says that turn
     firmware: bytes = b""  # parameters of the controller, where the other end may run it
 
 
@@ -201,6 +202,11 @@ class Work(Protocol):
     @property
     def done(self) -> int:
         """How many of them have ended."""
+        ...
+
+    @property
+    def shown(self) -> Mapping[str, Any]:
+        """What the method's view on the panel shows of the piece under way; plain data."""
         ...
 
     def piece(self) -> bytes | None:

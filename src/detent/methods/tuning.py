@@ -29,6 +29,18 @@ class Share:
     why: str  # in a sentence
 
 
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What the simulation of an axis does in time, to be laid beside that with other gains and of other plants."""
+
+    name: str  # what was done to it
+    label: str  # of what is seen
+    t: "NDArray[np.float64]"  # since then [s], shape (n,)
+    y: "NDArray[np.float64]"  # [m] or [rad], or a share, shape (n,)
+    figures: Mapping[str, str] = field(default_factory=dict[str, str])  # by name, as people read them
+    share: bool = False  # whether y is a share
+
+
 class Tuning(Protocol):
     """The choice of the gains of one axis over a set of plants: specifications that differ in what is not known.
 
@@ -73,6 +85,33 @@ class Tuning(Protocol):
         del stated, known
         return ()
 
+    def limits(self, plant: Any, values: Mapping[str, float], bounds: Bounds) -> str:
+        """Which bound the values are at on a plant, and where, as the end of a sentence; empty where it is not known.
+
+        Of several that are alike close, all.
+        """
+        del plant, values, bounds
+        return ""
+
+    def easier(self, plant: Any) -> Sequence[tuple[str, Any]]:
+        """Plants that cost something to have and may allow more: what is changed, in words, and the specification."""
+        del plant
+        return ()
+
+    def figures(self, plant: Any) -> Mapping[str, str]:
+        """What follows of its loops with the gains that it has, by name, as people read it."""
+        del plant
+        return {}
+
+    def responses(self, plant: Any) -> Sequence[Response]:
+        """What the simulation does when it is pushed, and on a short way; always as many."""
+        del plant
+        return ()
+
+    def followed(self, plant: Any, job: Any) -> Response | None:
+        """How far the simulation is off its reference during a job; None where that is no figure of the method."""
+        del plant, job
+
 
 @dataclass(frozen=True, slots=True)
 class Trial:
@@ -97,6 +136,11 @@ class Search(Protocol):
     """The first of what ranks them, as the label of an axis."""
     sides: tuple[str, str]
     """The two things in which candidates differ."""
+
+    @property
+    def job(self) -> Any:
+        """What candidates are tried with unless told otherwise; None for the trial job of the method."""
+        return None
 
     def candidates(self, held: Sequence[str]) -> Sequence[Mapping[str, Any]]:
         """Values that are tried; keys that are held have that of the file."""

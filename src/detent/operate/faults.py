@@ -130,17 +130,18 @@ LORE: dict[int, Lore] = {
     40: Lore(("the cable to the drive is cut", "the drive has lost its supply"), ("check cable and supply",)),
     50: Lore(
         ("the machine is busy with other work", "the loop has no real-time priority"),
-        ("end other programs", "give the loop real-time priority, or a longer period"), "lateness", "s",
+        ("end other programs", 'give the loop real-time priority, or a longer period: --period "5 ms"'),
+        "lateness", "s",
     ),
     51: Lore(("the process of the loop was stopped or killed",), ("start it again",)),
     52: Lore(("the sensor gave what is no number",), ("check the sensor and what computes with it",)),
-    54: Lore(("an error in the program",), ("keep the report, and start anew",)),
+    54: Lore(("an error in the program",), ("keep the report", "end detent live, and start it anew")),
     55: Lore(("the disk is full or read-only",), ("make room on the disk",)),
 }  # fmt: skip
 NOT_KNOWN = Lore(("what the sentence says",), ("mend that",))
 ALLOWED = {
     "A": ("reset", "enable"), "E": ("reset", "enable"), "H": ("reset", "enable", "home", "jog", "move_by"),
-    "C": (), "": ("enable",),
+    "C": (), "S": (), "": ("enable",),
 }  # fmt: skip
 """What may be done after it, by its recovery; stop and disable always may."""
 
@@ -211,7 +212,8 @@ class Faults:
         given = int(notes.code[k])
         code = axis.fault_numbers.get(given, given)
         lore, rule = LORE.get(code, NOT_KNOWN), rule_of(code)
-        text = (axis.fault() or REFUSAL_TEXT.get(given, "a fault that has no sentence")).partition("; ")[0]
+        text = axis.fault() or self._host.told(given) or REFUSAL_TEXT.get(given, "a fault that has no sentence")
+        text = text.partition("; ")[0]
         value, limit = None, axis.limits.get(given)
         unit = lore.unit.replace("m", axis.unit) if lore.unit in ("m", "m/s") else lore.unit
         if lore.shows == "lateness":

@@ -2,8 +2,11 @@
 
 import json
 import math
+import os
+import tempfile
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
@@ -20,7 +23,7 @@ from detent.control import operation as ops
 from detent.control.axis_states import STATE_NAMES
 from detent.control.commands import sum_of
 from detent.control.operation import ENDS, OperationParams
-from detent.errors import NO_MARK, OTHER_HARDWARE, DetentError
+from detent.errors import BROKEN, NO_MARK, OTHER_HARDWARE, DetentError
 from detent.methods.method import Live, Method, Work
 from detent.operate.drivers.driver import Driver, Link
 from detent.operate.faults import Faults
@@ -107,7 +110,7 @@ class Log:
         return log
 
 
-def operation_params(speed: float = 1.0, **more: Any) -> Any:
+def operation_params(speed: float = 1.0, *, creep: float = 0.1, **more: Any) -> Any:
     """Give a method what it fills its `OperationParams` with; `speed` is how fast the axis's time passes.
 
     That is ``make(look, window, (lowest, highest), *motions)``: time between two looks and time in the window [s], the
@@ -122,7 +125,7 @@ def operation_params(speed: float = 1.0, **more: Any) -> Any:
         return OperationParams(
             window_looks=looks, lease_looks=lease, job_looks=job,
             settle_looks=math.ceil(SETTLE / look), lowest=limits[0], highest=limits[1], takes=takes,
-            performs=int(ops.JOB not in motions), creep=0.1, **more
+            performs=int(ops.JOB not in motions), creep=creep, **more
         )  # fmt: skip
 
     return make
@@ -139,7 +142,7 @@ class Host:
         wall: bool = True, careful: bool = True, channels: Sequence[str] = (), store: Store | None = None,
         stated: bool = True, memory: mmap | None = None, driver: Driver | None = None,
     ) -> None:  # fmt: skip
-        make = operation_params(speed, careful=int(careful))
+        make = operation_params(speed, careful=int(careful), creep=spec.axis.creep)
         self.method = method.name
         self.board: Any = Board() if memory is None else Board.from_buffer(memory)
         self.link: Link | None = None
@@ -164,6 +167,7 @@ class Host:
         self._thread: threading.Thread | None = None
         self.keeper: Keeper | None = None
         self._store, self._stated, self._asking = store, stated, threading.Lock()
+        self.broken = ""  # what is known of an error in the program
         self._ended: dict[int, Ending] = {}
         self._forgotten = 0  # id of the last one that is not among them any more
         self.load_job: Callable[[Path], Any] = partial(method.load, spec)
@@ -224,7 +228,7 @@ class Host:
         self._thread.start()
         ready.wait()
         if self.link is not None:
-            self.link.start()
+            self.link.start(self.supervised)
         self.run_until_ready()
         return missing
 
@@ -246,7 +250,7 @@ class Host:
         self._until(lambda: self.ending(trusted) is not None)
         self.keeper = keeper
         if self._thread is not None:
-            keeper.start()
+            keeper.start(self.supervised)
 
     def close(self) -> None:
         """Stop, wait for rest, take the torque away, park, and end the loop."""
@@ -410,7 +414,38 @@ class Host:
 
     def told(self, reason: int) -> str:
         """What is known of a reason beyond its text."""
+        if reason == BROKEN:
+            return self.broken
         return self.link.told if self.link is not None and reason == OTHER_HARDWARE else ""
+
+    # ---- errors in the program
+
+    def supervised(self, work: Callable[[], None]) -> Callable[[], None]:
+        """Work of a thread beside the loop: an error in it is a fault of the axis, not the silent end of a thread."""
+
+        def run() -> None:
+            try:
+                work()
+            except Exception as error:  # noqa: BLE001 - whatever it is
+                self.break_down(error)
+
+        return run
+
+    def break_down(self, error: Exception) -> None:
+        """Part of the program has failed: the axis comes to rest, lets go, and stays so; keep a report beside it."""
+        self.board.loop.broken = 1
+        where = Path(tempfile.gettempdir()) / f"detent-{os.getpid()}.error"
+        if self._store is not None:
+            where = self._store.path.with_suffix(".error")
+        try:
+            where.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+            kept = f"keep the report, {where}"
+        except OSError as trouble:
+            kept = f"its report could not be kept ({trouble.strerror})"
+        self.broken = (
+            f"a part of the program beside the loop has ended in an error ({type(error).__name__}: {error}), and the "
+            f"axis is not enabled any more; {kept}, end detent live, and start it anew"
+        )
 
     @property
     def state(self) -> str:

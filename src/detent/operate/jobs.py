@@ -4,6 +4,7 @@ import math
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, cast
 
 from detent.control import operation as ops
@@ -20,6 +21,8 @@ KEYS = {"moves": "places, each a text", "rounds": "how often", "rest": "seconds 
 
 class Moves:
     """A job whose moves the operation makes."""
+
+    shown: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, job: Any, axis: Live, board: Any, share: float) -> None:
         legs = cast("Sequence[Leg]", job) if isinstance(job, list) else _legs_of(axis, job)

@@ -6,7 +6,7 @@ reference or the loss of one, is kept as soon as it is seen; until then the stor
 """
 
 import threading
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any
 
@@ -62,14 +62,14 @@ class Keeper:
         self._trust = TRUSTS.index(store.trust)
         return self._trust
 
-    def start(self) -> None:
-        """Look at the axis again and again, in a thread of its own."""
+    def start(self, supervised: Callable[[Callable[[], None]], Callable[[], None]]) -> None:
+        """Look at the axis again and again, in a thread of its own; `supervised` sees an error in it."""
 
         def look() -> None:
             while not self._left.wait(LOOK):
                 self.look()
 
-        self._thread = threading.Thread(target=look, name="store", daemon=True)
+        self._thread = threading.Thread(target=supervised(look), name="store", daemon=True)
         self._thread.start()
 
     def close(self) -> None:

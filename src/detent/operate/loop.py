@@ -29,7 +29,7 @@ from detent.control.operation import (
     stop,
 )
 from detent.control.program import Program, perform
-from detent.errors import LOOP_DEAD, LOOP_OVERRUN
+from detent.errors import BROKEN, LOOP_DEAD, LOOP_OVERRUN
 from detent.kernel.clock import monotonic_ns, sleep_until
 from detent.kernel.compiled import byte_at
 from detent.kernel.loop import Bytes, Offsets, run_disturbed, run_serve, run_stretch
@@ -98,6 +98,7 @@ class Loop(Registers):
     found_at: i8 = register("when it last did", unit="ns")
     deaths: i8 = register("pulls of this line that the loop has seen", unit="count")
     died: i8 = register("times that the loop has stood for too long", unit="count")
+    broken: u1 = register("line of the host: 1 once a part of the program has ended in an error")
 
 
 class FaultNotes(Registers):
@@ -191,6 +192,9 @@ def see_lines(b: Board) -> None:
         loop.pulled[loop.pulls % PULLS] = loop.periods
         loop.pulls += 1
         stop(o, 0)
+    if loop.broken:  # for good: whoever is left might not see what the axis does
+        o.barred = BROKEN
+        fail_softly(o, BROKEN)
 
 
 @step

@@ -34,7 +34,7 @@ class Session:
         self._jobs = threading.Lock()
         self._signals = self._name_signals()
         if host.is_running:
-            threading.Thread(target=self._keep_noting, name="notes", daemon=True).start()
+            threading.Thread(target=host.supervised(self._keep_noting), name="notes", daemon=True).start()
 
     def _keep_noting(self) -> None:
         """Take note of faults, and of what came from outside, before the loop's memory of it has come round."""

@@ -145,7 +145,8 @@ def status_of(host: Any, fault: str) -> dict[str, Any]:
         "error": a.error, "effort": a.effort, "limited": bool(a.limited), "rests": bool(a.rests),
         "at_end": _end_of(host.axis.live.operation, o), "in_window": bool(a.near),
         "ready": bool(a.ready), "trust": TRUSTS[o.trust], "confirmed": bool(o.confirmed),
-        "fault": {"code": int(o.fault), "text": fault or REFUSAL_TEXT.get(o.fault, "")} if o.fault else None,
+        "fault": {"code": int(o.fault), "text": fault or host.told(o.fault) or REFUSAL_TEXT.get(o.fault, "")}
+        if o.fault else None,
         "barred": {"code": int(o.barred), "text": host.told(o.barred) or REFUSAL_TEXT[o.barred]} if o.barred else None,
         "running": {"id": int(o.running), "command": kind} if o.running else None, "epoch": int(o.epoch),
         "job": _job_of(host) if o.kind == ops.JOB else None,
@@ -163,8 +164,8 @@ def _job_of(host: Any) -> dict[str, Any]:
     """How far the job has come that is under way."""
     return {
         "name": host.job.name, "done": host.job.done, "of": host.job.pieces,
-        "paused": bool(host.board.operation.paused),
-    } if host.job else {"name": "", "done": 0, "of": 0, "paused": False}  # fmt: skip
+        "paused": bool(host.board.operation.paused), "shown": dict(host.job.shown),
+    } if host.job else {"name": "", "done": 0, "of": 0, "paused": False, "shown": {}}  # fmt: skip
 
 
 def why_not_moving(status: dict[str, Any], client: int = 0) -> list[tuple[str, str]]:
@@ -183,7 +184,7 @@ def why_not_moving(status: dict[str, Any], client: int = 0) -> list[tuple[str, s
         found.append(("the first motion is held to a tenth of the speed", "look at it, then confirm"))
     if status["at_end"]:
         found.append((f"it stands at its {status['at_end']} limit", "move to the other side"))
-    if status["limited"]:
+    if enabled and status["limited"]:
         found.append(("the command is at its limit", "look for what holds the axis"))
     if enabled and status["rests"] and not status["in_window"]:
         found.append(("it is not in its window", "wait; where that lasts, look for what holds the axis, or stop"))
@@ -224,6 +225,7 @@ def describe_status(status: dict[str, Any], unit: str) -> str:
     """One line for a terminal."""
     place = format_quantity(status["position"], unit, 6)
     moving = "" if status["rests"] else f", {format_quantity(status['velocity'], unit + '/s')}"
-    fault = f"; fault {status['fault']['code']}: {status['fault']['text']}" if status["fault"] else ""
-    error = "" if math.isclose(status["error"], 0.0) else f", error {format_quantity(status['error'], unit, 3)}"
+    stands = status["fault"]
+    fault = f"; fault {stands['code']}: {stands['text'].partition('; ')[0]}" if stands else ""
+    error = "" if abs(status["error"]) < 1e-9 else f", error {format_quantity(status['error'], unit, 3)}"
     return f"{status['state']}, {place} ({status['trust']}){moving}{error}{fault}"

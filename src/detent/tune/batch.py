@@ -29,6 +29,7 @@ __all__ = [
 CHUNK, CHUNK_ALONE = 1000, 50  # cases of a chunk: of a method that makes many at once, of one that makes each alone
 CHUNK_WATCHED = 5  # and where each is watched at standstill, too
 STARTS = 8  # of each at standstill
+MOST_WATCHED = 1000  # machines there
 DONE = "done"  # the quantity that every case has: 1 or 0
 HUNTS = "hunts at rest"  # share of the starts of a machine that hunt
 SWING = "swing at rest"

@@ -5,8 +5,11 @@ controllers"), with a look at plants that the choice has not seen at the end.
 """
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from detent.axisfile.tolerance import value_of
 from detent.methods.method import untold
@@ -20,6 +23,7 @@ FRESH = 2000  # of those
 MOVES = 1e-6  # by how much a key must move the worst bound to count
 FEWEST = 0.1  # of what the nominal plant would get, below which the plant is not known well enough
 NARROWER = 0.25  # of an interval, of which is told what it would be worth
+LOOSER = 2.0  # Ms of which is told what it would be worth: above it a loop rings
 
 Progress = Callable[[float, str], None]
 
@@ -70,8 +74,7 @@ class Chooser:
         values = self.choose(binding)
         if not keys or not values:
             return Guaranteed(values, binding, 1.0)
-        moving = self.ranked(keys, values)[:CORNERS]
-        pool = [*binding, *self.plants.corners(moving), *self.plants.hypercube(HYPERCUBE, keys)]
+        pool = self.pool(values, keys)
         for number in range(MOST_ROUNDS):
             self.progress(0.8 * number / MOST_ROUNDS, f"round {number + 1}: {len(binding)} plants")
             levels = self.worst(pool, values)
@@ -88,6 +91,12 @@ class Chooser:
                 return Guaranteed({}, binding)
         return Guaranteed(values, binding, max(self.worst(pool, values)))
 
+    def pool(self, values: Mapping[str, float], keys: Sequence[str] | None = None) -> list[Variant]:
+        """The plant of the file, all corners of the keys that matter most with such values, and a Latin hypercube."""
+        keys = list(self.plants.tolerance) if keys is None else keys
+        moving = self.ranked(keys, values)[:CORNERS]
+        return [self.plants.nominal, *self.plants.corners(moving), *self.plants.hypercube(HYPERCUBE, keys)]
+
     def ranked(self, keys: Sequence[str], values: Mapping[str, float]) -> list[str]:
         """The keys that move a bound, the strongest first."""
         moved = dict[str, float]()
@@ -99,6 +108,45 @@ class Chooser:
     def worth(self, found: Guaranteed) -> float:
         """What was made as large as the bounds allow; 0 where there are no gains."""
         return self.tuning.worth(found.values) if found.values else 0.0
+
+    def keeps(self, found: Guaranteed, changed: Mapping[str, float]) -> bool:
+        """Whether the plants that decided keep the bounds with other values of some keys, too."""
+        if not set(changed) & set(found.values):
+            return True
+        return max(self.worst(found.binding, {**found.values, **changed})) <= BEYOND
+
+    def limits(self, found: Guaranteed) -> str:
+        """What keeps the choice from more, in words: bounds that are reached, on the plant that reaches them most."""
+        levels = self.worst(found.binding, found.values)
+        number = levels.index(max(levels))
+        told = self.tuning.limits(found.binding[number].spec, found.values, self.bounds)
+        return f"{told}, on plant {number + 1} that decides" if told and number else told
+
+    def further(self, nominal: Guaranteed) -> list[tuple[str, float]]:
+        """What would allow more on the axis of the file: in words, and how many times as much, the most first.
+
+        Computed as the choice is, with one thing changed at a time: infinite where there are gains only so, 0 where
+        there are none even so.
+        """
+        goal, spec = self.tuning.goals[0], self.plants.spec
+        changes = [(text, made, self.bounds) for text, made in self.tuning.easier(spec)]
+        if changes and self.bounds.sensitivity < LOOSER:
+            phase = math.degrees(2.0 * math.asin(0.5 / LOOSER))
+            text = f"Ms {LOOSER:g}, a gain margin of {LOOSER / (LOOSER - 1.0):.3g} and {phase:.0f} deg of phase,"
+            changes.append((text, spec, replace(self.bounds, sensitivity=LOOSER)))
+        if changes and goal != self.goal:
+            changes.append(("", spec, self.bounds))
+
+        def tried(change: tuple[str, Any, Bounds]) -> tuple[str, float]:
+            """What one of them would be worth."""
+            values = self.tuning.choose([change[1]], change[2], goal, self.held)
+            return change[0], self.tuning.worth(values) if values else 0.0
+
+        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+            found = dict(pool.map(tried, changes))
+        base = found.pop("", self.worth(nominal))
+        shares = {text: worth / base if base else math.inf if worth else 0.0 for text, worth in found.items()}
+        return sorted(shares.items(), key=lambda one: -one[1])
 
     def regained(self) -> list[tuple[str, float]]:
         """What each interval a quarter as wide, the others as they are, would be worth, the most first."""

@@ -1,12 +1,13 @@
-"""The least dead band that stops hunting, and what more of it and of the integral would do."""
+"""What stops hunting: the least dead band, or less of an integral; and what more of both would do."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from detent.axisfile.tolerance import value_of
 from detent.methods.method import untold
 from detent.methods.tuning import digits
 from detent.tune.standstill import Standstill, standstill
@@ -16,6 +17,8 @@ FINEST = 0.1  # of the swing, to which the width is sought
 WIDTHS = np.linspace(0.0, 1.5, 8)  # of the map, in swings
 INTEGRALS = (0.0, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0)  # of the map, times that of the file
 MAP_STARTS = 12
+HALVES = 6  # of an integral that are tried, before none
+CLOSER = 1.1  # to which factor of the largest that does
 
 Progress = Callable[[float, str], None]
 
@@ -70,6 +73,62 @@ def least_band(spec: Any, found: Standstill, most: float, progress: Progress = u
         middle = digits(0.5 * (low + high), math.ceil)
         low, high = (low, middle) if stops(middle) else (middle, high)
     return Band(high, high, sorted(tried, key=lambda one: one.width))
+
+
+@dataclass(frozen=True, slots=True)
+class Cure:
+    """What stops an axis from hunting, and what it costs."""
+
+    key: str
+    value: float
+    name: str  # in words
+    rest_error: float  # largest error at which the axis then rests [m]
+
+
+def cures(spec: Any, found: Standstill, held: Container[str] = (), progress: Progress = untold) -> list[Cure]:
+    """The least dead band that stops it, and the largest integral that hunts no more, the smaller rest error first.
+
+    Keys that are held stay as they are; none where neither stops it.
+    """
+    made, ensemble = list[Cure](), found.ensemble
+    if ensemble.band and ensemble.band not in held:
+        band = least_band(spec, found, spec.method.in_position, lambda at, text: progress(0.5 * at, text)).found
+        if band is not None:
+            made.append(Cure(ensemble.band, band.width, "a dead band", band.rest_error))
+    if ensemble.band and ensemble.integral and ensemble.integral not in held:
+        progress(0.5, "less integral")
+        integral = _largest_integral(spec, found)
+        made += [integral] if integral is not None else []
+    return sorted(made, key=lambda one: one.rest_error)
+
+
+def _largest_integral(spec: Any, found: Standstill) -> Cure | None:
+    """Of shares of the integral, and none, the largest from which no start of three seeds hunts."""
+    key, gain = found.ensemble.integral, value_of(spec, found.ensemble.integral)
+
+    def rests(share: float) -> tuple[float, float] | None:
+        """The integral and the largest error at rest; None where a start hunts."""
+        value, error = digits(share * gain) if share else 0.0, 0.0
+        for seed in range(found.seed, found.seed + SEEDS):
+            tried = standstill(spec.varied({key: value}), len(found.found), seed, on_counts=found.on_counts)
+            if tried.hunts:
+                return None
+            error = max(error, tried.rest_error)
+        return value, error
+
+    low, high, made = 0.0, 1.0, None
+    for share in (0.5**k for k in range(1, HALVES)):
+        if (made := rests(share)) is not None:
+            low = share
+            break
+        high = share
+    if made is None:
+        made = rests(0.0)
+        return None if made is None else Cure(key, made[0], "no integral", made[1])
+    while high > CLOSER * low:
+        middle = math.sqrt(low * high)
+        low, high, made = (middle, high, better) if (better := rests(middle)) else (low, middle, made)
+    return Cure(key, made[0], "less integral", made[1])
 
 
 @dataclass(frozen=True, slots=True)

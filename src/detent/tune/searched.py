@@ -127,13 +127,14 @@ class Searched(Chosen):
         return told + [(name, before.get(name, "-"), after.get(name, "")) for name in names]
 
     def new_values(self) -> list[NewValue]:
-        """The values, with what is said of each in the file."""
+        """Values that are others than those of the file, with what is said of each in it."""
+        held = {dotted(path): value for path, _, value in held_leaves(self.file.spec)}
         units = {dotted(path): unit_of(field) for path, field, _ in held_leaves(self.file.spec)}
         note = f"best of {len(self.candidates)} simulated candidates"
         return [
             NewValue(key, 0.0, units[key], note, "tuned", str(cast("list[int]", value))) if isinstance(value, list)
             else NewValue(key, value, units[key], note, "tuned")
-            for key, value in self.values.items()
+            for key, value in self.values.items() if value != held[key]
         ]  # fmt: skip
 
     def report(self, path: str | Path, *, force: bool = False) -> Path:
@@ -180,7 +181,7 @@ def search(file: AxisFile, *, hold: Sequence[str] = (), job: Any = None, progres
     told, spec = progress or untold, file.spec
     method = METHODS[spec.axis.method]
     made = method.search(spec)
-    job = method.trial_job(spec) if job is None else job
+    job = job or made.job or method.trial_job(spec)
     _check_held(hold, made)
     before = made.tried(spec, job)
     wanted = [values for values in made.candidates(hold) if _is_allowed(method, spec, values)]

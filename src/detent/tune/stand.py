@@ -11,6 +11,7 @@ from detent.kernel.step import config
 from detent.methods.check import check_spec
 from detent.methods.load import AxisFile
 from detent.methods.registry import METHODS
+from detent.methods.tuning import Response
 from detent.tune.standstill import HUNTS, Standstill, standstill
 from detent.units import format_quantity
 
@@ -19,7 +20,7 @@ EDGE = 1.5  # counts that an axis must swing for `check` to warn: across the edg
 ASSUMED = "static friction or Stribeck velocity is a default"
 COMPILED = not config.DISABLE_JIT
 NONE = "none: it does not settle"
-MEASURES = ("Ms at", "phase margin at", "gain margin at")
+MEASURES = ("Ms at", "phase margin at", "gain margin at", "delay margin at")
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,10 @@ class Stand:
     result: Any
     summary: Sequence[tuple[str, str]]
     cautions: Sequence[Caution]
+    period: float  # of its samples [s]
     stood: Standstill | None  # what it does at standstill; None where it does not settle, or nothing watches it
+    figures: Mapping[str, str]  # what follows of its loops, and what it does in time, by name
+    responses: Sequence[Response]  # what it does in time when it is pushed, and on a short way
 
     @classmethod
     def of(cls, file: AxisFile, job: Any) -> "Stand":
@@ -43,9 +47,14 @@ class Stand:
         model, result = method.linear(spec), method.run(spec, job)
         outer = [cut for cut in model.loops if "position" in cut]
         bandwidth = model[outer[0]].closed().bandwidth if outer and model.settles else None
-        summary = method.summary(spec, result)
+        summary, tuning = method.summary(spec, result), method.tuning(spec)
         stood = standstill(spec, STARTS) if method.stands and model.settles else None
-        return cls(file, model.margins, model.settles, bandwidth, result, summary, check_spec(file).warnings, stood)
+        responses = tuning.responses(spec) if model.settles else ()
+        figures = dict(tuning.figures(spec)) | {name: text for one in responses for name, text in one.figures.items()}
+        return cls(
+            file, model.margins, model.settles, bandwidth, result, summary, check_spec(file).warnings,
+            next(iter(model.loops.values())).dt, stood, figures, responses,
+        )  # fmt: skip
 
     @property
     def at_rest(self) -> str:
@@ -64,6 +73,10 @@ class Stand:
         level, peak = self.sensitivity
         return f"{level:.3g} at {format_quantity(peak, 'Hz', 3)}" if self.settles else NONE
 
+    def _late(self, delay: float) -> str:
+        """A delay margin, in samples too."""
+        return f"{format_quantity(delay, 's', 3)}, {delay / self.period:.3g} samples" if delay < math.inf else "any"
+
     def rows(self) -> Iterator[tuple[str, str]]:
         """Figures to be laid beside those of other gains."""
         for cut, one in self.margins.items():
@@ -72,9 +85,12 @@ class Stand:
                 continue
             yield f"Ms at {cut}", f"{one.sensitivity:.3g} at {format_quantity(one.peak, 'Hz', 3)}"
             yield f"phase margin at {cut}", format_quantity(one.phase, "rad", 3)
-            yield f"gain margin at {cut}", f"{one.gain:.3g}" if math.isfinite(one.gain) else "any"
+            down = f", down to {one.least:.2g}" if one.least else ""
+            yield f"gain margin at {cut}", (f"{one.gain:.3g}" if math.isfinite(one.gain) else "any") + down
+            yield f"delay margin at {cut}", self._late(one.delay)
         if any("position" in cut for cut in self.margins):
             yield "bandwidth, -3 dB", format_quantity(self.bandwidth, "Hz", 3) if self.bandwidth else "none"
+        yield from self.figures.items()
         if METHODS[self.file.spec.axis.method].stands:
             yield "standstill", self.at_rest or NONE
         yield from ((name, text.partition(", from ")[0]) for name, text in self.summary)

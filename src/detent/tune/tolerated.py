@@ -18,6 +18,7 @@ from detent.methods.method import untold
 from detent.record.machine import Progress
 from detent.tune.batch import (
     DONE,
+    MOST_WATCHED,
     STARTS,
     Chunk,
     Question,
@@ -36,7 +37,6 @@ from detent.units import format_quantity
 
 TRIED = 20  # cases that tell how long all will take
 LONGEST = 3600.0  # that is done unasked [s]
-MOST_WATCHED = 1000  # cases, at standstill
 WORST = "worst"  # folder of axis files, in the store
 MOST = 10_000_000  # cases
 CAUSES = "What a key explains alone, and its rank correlation"

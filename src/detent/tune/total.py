@@ -9,7 +9,7 @@ import numpy as np
 
 from detent.analysis.sensitivity import Index, interval_of
 from detent.errors import DetentError
-from detent.tune.batch import Chunk, chunks_of, run_chunks
+from detent.tune.batch import MOST_WATCHED, Chunk, chunks_of, run_chunks
 from detent.tune.cases import Numbers, Question
 
 LEAST, MOST = 64, 2**20  # points of a sample
@@ -27,8 +27,13 @@ def scheme_of(question: Question, points: int) -> tuple[Question, int]:
             f"--total: got {joint[0]}, which varies together with another key; expected: keys that are independent of "
             "one another; leave out `correlation`, or --total"
         )
-    asked = replace(question, scheme=points, margins=False, hunt=False)
-    return asked, points * (len(question.tolerance) + 2)
+    cases = points * (len(question.tolerance) + 2)
+    if question.hunt and cases > MOST_WATCHED:
+        raise DetentError(
+            f"--total: got {points} with --hunt, which makes {cases} machines to be watched at standstill; expected: "
+            f"at most {MOST_WATCHED}; ask for fewer points, or leave out --hunt"
+        )
+    return replace(question, scheme=points), cases
 
 
 def totals(

@@ -22,8 +22,11 @@ from detent.methods.registry import METHODS
 from detent.methods.tuning import Bounds, Share
 from detent.tune.choice import FEWEST, Chooser, Guaranteed, Progress, value_of
 from detent.tune.chosen import Chosen
+from detent.tune.dead_band import Cure, cures
 from detent.tune.plants import Plants
-from detent.tune.stand import Stand
+from detent.tune.stand import Stand, at_rest
+from detent.tune.standstill import Standstill, standstill
+from detent.units import format_quantity
 
 SAME = 1e-12  # of a gain, as a share
 TRADED = (1.3, 1.4, 1.5, 1.6, 1.7, 1.85, 2.0, 2.2)  # values of Ms of which a report tells what they would give
@@ -36,6 +39,8 @@ GOALS = {
 }
 """Why these, by what was asked for."""
 RANKED = 2  # intervals of which is told what they would be worth
+TOLD, WORTH_IT = 3, 1.05  # changes of the axis of which is told what they would be worth, and how much that is at least
+LEAST_SPEED = 0.5  # of the bandwidth of the velocity loop that the axis of the file would have
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,6 +61,14 @@ class Tuned(Chosen):
         Why there are none, or why they hold for the nominal axis only.
     shares : sequence of Share
         Shares of feedforward, each with its reason.
+    limited : str
+        What keeps the gains from more, in words; empty where the method does not say.
+    further : sequence of tuple
+        What would allow more: in words, and how many times as much; infinite where there are no gains without it.
+    cures : sequence of Cure
+        What stops the hunting of these gains, that with the smaller rest error first: it is among `values`.
+    hunted : Standstill or None
+        How they hunt without it.
     """
 
     before: Stand
@@ -68,6 +81,10 @@ class Tuned(Chosen):
     guaranteed: Guaranteed
     refusals: Sequence[Caution]
     shares: Sequence[Share]
+    limited: str
+    further: Sequence[tuple[str, float]]
+    cures: Sequence[Cure]
+    hunted: Standstill | None
     chooser: Chooser = field(compare=False)
 
     @property
@@ -94,17 +111,36 @@ class Tuned(Chosen):
                 f"What [tolerance] leaves open costs {100 - share:.0f} % of it; {number} other "
                 f"plant{'s' if number != 1 else ''} decided, and {self.guaranteed.fresh} random ones kept the bounds."
             )
-        told += [one.why for one in self.shares]
-        if self.after is not None and self.after.stood is not None and self.after.stood.hunts:
-            remedy = "a dead band of half of that and half a count stops such motion"
-            told.append(f"At standstill it {self.after.at_rest}: {remedy}.")
-            if not self.after.stood.ensemble.stated:
-                told.append(
-                    "That depends on static friction and Stribeck velocity, which the file does not state: "
-                    "`detent hunt` has a table of what it does with others; slow moves with reversals, recorded, tell "
-                    "which it is."
-                )
+        return [*told, *self.what_limits, *(one.why for one in self.shares), *self._at_standstill()]
+
+    @property
+    def what_limits(self) -> list[str]:
+        """What keeps the axis from more, and what more would take, in sentences."""
+        told = [f"What limits it: {self.limited}."] if self.limited else []
+        best = [(text, times) for text, times in self.further[:TOLD] if WORTH_IT <= times < math.inf]
+        more = [f"{text} gives {times:.2g} times" for text, times in best]
+        if more:
+            told.append(f"To go further, on the axis of the file: {'; '.join(more)} the {self.worth_text}.")
         return told
+
+    def _at_standstill(self) -> Iterator[str]:
+        """How it hunts, and what was done about it."""
+        if self.hunted is None:
+            return
+        unit, stops = self.hunted.ensemble.unit, list[str]()
+        fields = {dotted(path): field for path, field, _ in held_leaves(self.file.spec)}
+        for one in self.cures:
+            text = f"{one.name}, {one.key} {format_value(fields[one.key], one.value)}"
+            stops.append(f"{text}, with which it rests up to {format_quantity(one.rest_error, unit, 3)} off")
+        told = f"At standstill these gains would have it go to and fro for ever: it {at_rest(self.hunted)}."
+        none = "Neither a dead band within method.in_position nor less integral stops it; see `detent hunt`."
+        none = none if self.hunted.ensemble.band else "See `detent hunt`."
+        yield f"{told} What stops it: {', or '.join(stops)}; the first is chosen." if stops else f"{told} {none}"
+        if not self.hunted.ensemble.stated:
+            yield (
+                "That depends on static friction and Stribeck velocity, which the file does not state: `detent hunt` "
+                "has a table of what it does with others; slow moves with reversals, recorded, tell which it is."
+            )
 
     @cached_property
     def trade(self) -> list[tuple[float, float]]:
@@ -169,6 +205,9 @@ class Tuned(Chosen):
         if self.before.file.tolerance and self.done:
             note += f", guaranteed {self.bounds.sensitivity:g} over [tolerance]"
         why = {one.key: one.why.partition(": ")[2].rstrip(".") for one in self.shares}
+        if self.cures and self.hunted is not None:
+            swing = format_quantity(self.hunted.swing, self.hunted.ensemble.unit, 3)
+            why[self.cures[0].key] = f"stops hunting by {swing}"
         return [NewValue(key, value, units[key], why.get(key, note), "tuned") for key, value in self.values.items()]
 
     @property
@@ -198,6 +237,7 @@ class Tuned(Chosen):
                        for cut, m in one.margins.items()}  # fmt: skip
             return {
                 "margins": margins, "settles": one.settles, "bandwidth": one.bandwidth, "run": one.result.to_dict(),
+                "figures": dict(one.figures),
                 "standstill": {"shares": dict(one.stood.shares), "swing": one.stood.swing} if one.stood else None,
                 "warnings": [str(caution) for caution in one.cautions],
             }  # fmt: skip
@@ -210,13 +250,19 @@ class Tuned(Chosen):
             "binding": [dict(one.values) for one in self.guaranteed.binding], "worst": self.guaranteed.worst,
             "fresh": self.guaranteed.fresh, "refusals": [vars_of(one) for one in self.refusals],
             "shares": {one.key: one.why for one in self.shares},
+            "limited": self.limited,
+            "further": {text: times if math.isfinite(times) else None for text, times in self.further},
+            "cures": [vars_of(one, CURE) for one in self.cures],
             "before": stand(self.before), "after": stand(self.after),
         }  # fmt: skip
 
 
-def vars_of(caution: Caution) -> dict[str, str]:
-    """A refusal as plain data."""
-    return {name: getattr(caution, name) for name in ("name", "value", "limit", "consequence", "remedy")}
+REFUSAL, CURE = ("name", "value", "limit", "consequence", "remedy"), ("key", "value", "name", "rest_error")
+
+
+def vars_of(one: Any, names: Sequence[str] = REFUSAL) -> dict[str, Any]:
+    """A refusal, or what stops hunting, as plain data."""
+    return {name: getattr(one, name) for name in names}
 
 
 def tune(  # noqa: PLR0913 - what may be asked
@@ -230,7 +276,8 @@ def tune(  # noqa: PLR0913 - what may be asked
     tuning, bounds = method.tuning(spec), _bounds(sensitivity, overshoot)
     job = method.trial_job(spec) if job is None else job
     shares = tuning.shares(file.origins, {key: _unsure(spec, key, one) for key, one in file.tolerance.items()})
-    held = _held(hold, tuning, [one.key for one in shares])
+    others = [METHODS[spec.axis.method].standstill(spec).band] if method.stands else []
+    held = _held(hold, tuning, [one.key for one in shares] + [key for key in others if key])
     fed = {one.key: one.value for one in shares if one.key not in hold and one.value != value_of(spec, one.key)}
 
     @cache
@@ -244,18 +291,37 @@ def tune(  # noqa: PLR0913 - what may be asked
     nominal = chooser.nominal()
     found = chooser.guaranteed() if file.tolerance and nominal.values else nominal
     worth = tuning.worth(tuning.stated), chooser.worth(nominal), chooser.worth(found)
-    refusals = [*_unknown(file), *_refusals(chooser, nominal, found)]
-    values = (nominal if refusals else found).values
-    chosen = dict(values) | fed if values else {}
-    progress(0.85, "trying the gains of the file")
+    further = chooser.further(nominal)
+    refusals = [*_unknown(file), *_refusals(chooser, nominal, found, further)]
+    kept = nominal if refusals else found
+    chosen = dict(kept.values) | fed if kept.values else {}
+    progress(0.8, "trying the gains of the file")
     before = Stand.of(file, job)
-    progress(0.92, "trying the new gains")
-    after = Stand.of(file.replaced(_typed(spec, chosen)), job) if values else None
+    progress(0.85, "trying the new gains")
+    after = Stand.of(file.replaced(_typed(spec, chosen)), job) if kept.values else None
+    hunted, stops = _stopped(after, hold, lambda at, text: progress(0.85 + 0.1 * at, text))
+    stops = [one for one in stops if chooser.keeps(kept, {one.key: one.value})]
+    if stops:
+        chosen[stops[0].key] = stops[0].value
+        after = Stand.of(file.replaced(_typed(spec, chosen)), job)
     if after is not None and not refusals:
         others = (method.run(one.spec.varied(chosen), job) for one in found.binding[1:])
         refusals = list(_saturated([after.result, *others]))
-    kept = [one for one in shares if one.key not in hold]
-    return Tuned(before, after, bounds, chooser.goal, chosen, worth, tuning.worth_text, found, refusals, kept, chooser)
+    limited = chooser.limits(kept) if kept.values else ""
+    told = [one for one in shares if one.key not in hold]
+    return Tuned(
+        before, after, bounds, chooser.goal, chosen, worth, tuning.worth_text, found, refusals, told, limited, further,
+        stops, hunted, chooser,
+    )  # fmt: skip
+
+
+def _stopped(after: Stand | None, hold: Sequence[str], progress: Progress) -> tuple[Standstill | None, list[Cure]]:
+    """How the axis hunts with its new gains, from as many starts as `hunt` takes, and what stops it."""
+    if after is None or after.stood is None or not after.stood.hunts:
+        return None, []
+    spec = after.file.spec
+    found = standstill(spec, after.stood.ensemble.usual)
+    return found, cures(spec, found, hold, progress)
 
 
 def _unsure(spec: AxisSpec, key: str, one: Tolerance) -> float:
@@ -317,24 +383,39 @@ def _unknown(file: AxisFile) -> Iterator[Caution]:
         )  # fmt: skip
 
 
-def _refusals(chooser: Chooser, nominal: Guaranteed, found: Guaranteed) -> Iterator[Caution]:
+def _refusals(
+    chooser: Chooser, nominal: Guaranteed, found: Guaranteed, further: Sequence[tuple[str, float]]
+) -> Iterator[Caution]:
     """Why there are no gains, or none for all plants."""
     limit = f"Ms up to {chooser.bounds.sensitivity:g}, overshoot up to {chooser.bounds.overshoot:g}"
     if not nominal.values:
         consequence = "no gains keep these bounds on the axis of the file"
-        yield Caution(
-            "gains", "none", limit, consequence, "shorten the dead time, stiffen the coupling, or allow a larger --ms"
-        )
+        ways = [text.rstrip(",") for text, times in further if times > 0.0][:TOLD]
+        remedy = "shorten the dead time, stiffen the coupling, or allow a larger --ms"
+        remedy = f"there are some with {', or '.join(ways)}" if ways else remedy
+        yield Caution("gains", "none", limit, consequence, remedy)
         return
-    share = chooser.worth(found) / chooser.worth(nominal)
+    share, speed = chooser.worth(found) / chooser.worth(nominal), _slower(chooser, nominal, found)
+    if share >= FEWEST and speed >= LEAST_SPEED:
+        return
+    what, least = chooser.tuning.worth_text, FEWEST
     if share >= FEWEST:
-        return
-    what = chooser.tuning.worth_text
+        what, share, least = "the bandwidth of the velocity loop", speed, LEAST_SPEED
     ranking = [_worth_of(chooser, key, worth / chooser.worth(nominal)) for key, worth in chooser.regained()[:RANKED]]
     yield Caution(
-        "plant", f"{what} for all plants {100 * share:.2g} % of the nominal one's", f"at least {100 * FEWEST:g} %",
+        "plant", f"{what} for all plants {100 * share:.2g} % of the nominal one's", f"at least {100 * least:g} %",
         "gains that hold for all that [tolerance] allows would be useless", "; ".join(ranking),
     )  # fmt: skip
+
+
+def _slower(chooser: Chooser, nominal: Guaranteed, found: Guaranteed) -> float:
+    """Bandwidth of the velocity loop with the gains for all plants, over that with the nominal ones; 1 without one."""
+    spec, linear = chooser.plants.spec, METHODS[chooser.plants.spec.axis.method].linear
+    both = [linear(spec.varied(_typed(spec, one.values))).loops for one in (found, nominal) if one.values]
+    if len(both) < 2 or "velocity" not in both[0]:
+        return 1.0
+    after, before = (loops["velocity"].margins().crossover for loops in both)
+    return after / before if before else 1.0
 
 
 def _worth_of(chooser: Chooser, key: str, share: float) -> str:

@@ -60,6 +60,15 @@ def pid(**changes: float) -> CascadeLawParams:
     return law(**gains | changes)
 
 
+@pytest.mark.parametrize("integral", [math.nan, math.inf])
+def test_what_is_no_number_is_not_limited_to_one(integral):
+    """The guard sees it then; a limit would hide it."""
+    p, r = law(), CascadeLaw(integral=integral)
+    control(p, r, reference(1.0), 0.5, 0.0)
+    assert math.isnan(r.command) or r.command == p.max_command
+    assert math.isnan(r.command) == math.isnan(integral)
+
+
 def test_position_pid():
     p, r = pid(), CascadeLaw()
     control(p, r, reference(1.0), 0.75, 0.125)

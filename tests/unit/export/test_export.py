@@ -10,7 +10,6 @@ import pytest
 import detent
 from detent.errors import DetentError, InputError
 from detent.export.code import range_checks, seconds, template
-from detent.export.translate.values import RefusedError, Shape
 from detent.export.unit import options_of, outside_ranges, unit_of
 from detent.export.vectors import CALL, CHECK, END, SIGNAL, TICKS, WRITE, Golden, record
 from detent.export.verify import TARGETS, Target, differences, told_of, verify
@@ -19,6 +18,7 @@ from detent.kernel.image import FNV_BASIS, FNV_PRIME, WHOLE, begin_hash
 from detent.kernel.registers import Registers, f8, i2_array, i8, register, u1
 from detent.methods.cascade.controller import CascadeControllerParams, coast, guard_axis, take_event
 from detent.methods.cascade.host import CascadeHost
+from detent.translate.values import RefusedError, Shape
 
 pytestmark = pytest.mark.compiled
 MOST = 2200

@@ -22,6 +22,8 @@ from detent.methods.check import check_spec
 from detent.methods.method import Method
 from detent.methods.registry import METHODS
 
+AXIS = ("axis.name", "axis.method", "axis.creep")  # keys of every method
+
 
 class SledAxisTable(AxisTable, frozen=True):
     """Name and method of the axis."""
@@ -121,7 +123,7 @@ def test_defaults_rules_and_reports_are_those_of_the_method(load_text):
     axis = load_text(SLED_TEXT)
     assert axis.spec.park == 1.0
     report = check_spec(axis)
-    assert (report.method, [row.key for row in report.rows]) == ("sled", ["axis.name", "axis.method", "travel", "park"])
+    assert (report.method, [row.key for row in report.rows]) == ("sled", [*AXIS, "travel", "park"])
     assert [figure.text for figure in report.derived] == ["2 m"]
     assert report.warnings == ()
     assert [caution.name for caution in check_spec(load_text(SLED_TEXT, "travel=10 m")).warnings] == ["travel"]

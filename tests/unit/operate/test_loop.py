@@ -16,6 +16,7 @@ from detent.methods.print_head.print_job import parse_text
 from detent.methods.registry import METHODS
 from detent.operate.faults import injection_of
 from detent.operate.host import Host, repeat
+from detent.operate.session import Session
 from detent.plant.injection import KIND_NAMES
 
 
@@ -177,3 +178,28 @@ def test_a_head_prints_a_line_and_moves_on():
     place = host.board.operation.answer.position
     assert host.until_ended(host.ask(ops.MOVE_BY, 5e-3, 0.2)).how == DONE  # slower than it runs by itself
     assert abs(host.board.operation.answer.position - place - 5e-3) < 1.1e-3
+
+
+def test_an_error_beside_the_loop_brings_the_axis_to_rest_for_good(tmp_path, monkeypatch):
+    """A thread that ends in an error is a fault (54), told with what it was, and written down."""
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+    bench = Bench("cascade").enable()
+    move = bench.host.ask(ops.MOVE_BY, 0.2)
+    bench.pass_time(0.2)
+
+    def work() -> None:
+        raise RuntimeError("injected")
+
+    bench.host.supervised(work)()
+    bench.pass_time(0.5)
+    ending = bench.host.ending(move)
+    assert ending is not None
+    assert (ending.how, ending.why) == (ops.FAILED, 54)
+    assert (bench.host.state, bench.answer.rests, bench.host.axis.state.lines.enable) == ("fault", 1, 0)
+    assert bench.do(ops.RESET).how == ops.DONE
+    assert bench.do(ops.ENABLE).why == 54
+    session = Session(bench.host, {})
+    assert "RuntimeError: injected" in session.status()["barred"]["text"]
+    assert session.faults()[0]["allowed"] == []
+    (report,) = tmp_path.glob("*.error")
+    assert "RuntimeError: injected" in report.read_text(encoding="utf-8")

@@ -203,6 +203,15 @@ def test_total_indices_are_beside_the_shares(file):
     assert found.to_dict()["total"]["peak_following"][MASS][0] == total[MASS].value
 
 
+@pytest.mark.compiled
+def test_total_indices_of_margins_and_not_of_too_many_that_are_watched(file):
+    job = file.with_name("job.toml")
+    found = detent.load(file).tolerance(job, cases=8, workers=2, total=64, margins=True, limits=["Ms at command <= 2"])
+    assert set(found.total["Ms at command"]) == {one.key for one in found.question.tolerance}
+    with pytest.raises(DetentError, match="watched at standstill"):
+        detent.load(file).tolerance(job, cases=8, total=1024, hunt=True)
+
+
 def test_keys_that_vary_together_have_no_total(file, tmp_path):
     made = tmp_path / "slide.toml"
     joint = f'"{MASS}" = {{ interval = "10 %", correlation = {{ "mechanics.friction.positive.viscous" = 0.5 }} }}'

@@ -67,7 +67,7 @@ def _frequency(found: Found, details: Mapping[str, Any]) -> str:
 def _steps(found: Found, details: Mapping[str, Any]) -> str:
     moves = details["moves"]
     worst = max((abs(move["overshoot"] / move["way"]) for move in moves if move["overshoot"]), default=0.0)
-    rest = max((abs(one.value), one.unit) for name, one in found.items() if name.endswith("rest_error"))
+    rests = [(abs(one.value), one.unit) for name, one in found.items() if name.endswith("rest_error")]
     told = [f"{sum(move['times'] for move in moves)} moves of {len(moves)} kinds"]
     if any(move["is_profile"] for move in moves):
         told.append(
@@ -75,7 +75,7 @@ def _steps(found: Found, details: Mapping[str, Any]) -> str:
             "response"
         )
     told.append(f"overshoot up to {worst:.1%} of the distance" if worst > LARGE else "no significant overshoot")
-    told.append(f"at rest up to {format_quantity(*rest, 3)} from the reference")
+    told += [f"at rest up to {format_quantity(*max(rests), 3)} from the reference"] if rests else []
     if worst > LARGE:
         told.append("lower the outer gain, or record the frequency response")
     return "; ".join(told)

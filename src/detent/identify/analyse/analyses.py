@@ -169,7 +169,10 @@ def _sensors(log: Log, effort: str, _: float) -> Found:
         unit = log.units["position"]
         told.append(estimate("resolution", resolution.step, unit, 0.0, "step common to all positions"))
     if effort or not log.signals.keys().isdisjoint(EFFORTS):
-        dead = find_dead_time(log.t, log.signals[log.effort(effort)], log.signals["position"])
+        try:
+            dead = find_dead_time(log.t, log.signals[log.effort(effort)], log.signals["position"])
+        except DetentError as error:
+            return Found(tuple(told), "" if told else str(error), (*notes, f"dead time: no result: {error}"), details)
         # A dead time that is not to be trusted is none: it would be put into a file all the same.
         told += [] if dead.reason else [dead.estimate]
         notes += [f"dead time: no result: {dead.reason}"] if dead.reason else []

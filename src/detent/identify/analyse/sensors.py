@@ -40,6 +40,7 @@ _VARIED = 0.8
 _MANY = 50
 _SAME = 1e-3
 LONGEST = 40  # samples up to which a dead time is looked for
+WIDEST = 10.0  # half of the interval of a dead time, in samples, at most
 EXPLAINED = 0.7  # share of the effort's variance that the motion must explain
 BLOCKS = 8  # parts of the recording whose dead times are compared
 _FEWEST_ROWS = 4
@@ -186,6 +187,8 @@ def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float |
         late = f"{-1e3 * value:.3g} ms"
         advice = "the effort is time-stamped late, or the position early; record both with the same clock"
         doubt = f"the motion comes {late} before its effort, which is not causal: {advice}"
+    elif found.half > WIDEST * step:
+        doubt = f"{1e3 * value:.3g} +- {1e3 * found.half:.3g} ms: its parts disagree; record more changes of speed"
     elif not -0.5 < shift < LONGEST - 0.5:
         advice = "check the sign and the clock of the effort"
         doubt = f"no dead time from 0 to {LONGEST} samples explains the motion; {advice}"

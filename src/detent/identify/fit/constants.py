@@ -50,6 +50,7 @@ class Constants:
     degrees: Values  # degrees of freedom behind the variance of each
     method: str  # how they were found
     delay_is_told: bool = True  # False where the delay is only what fits best
+    bounded: tuple[str, ...] = ()  # those that the search left at an end of its range
 
     def value(self, name: str) -> float:
         """A constant; 0 where it was not looked for."""

@@ -37,6 +37,7 @@ _SHAPE = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** 4
 FINE, FINEST = 6e-3, 4  # half of the window that tells the direction [s], and its fewest samples
 NOISES = 5.0  # velocity that is told from standstill, in standard deviations of its noise
 HOPS = 2  # rows per half window
+BESIDE = 4  # ways before and behind a jump that tell the usual one
 LOSS = "loss"  # named in a model whose transmission loses a share of the effort; it bends the terms, without a column
 
 
@@ -97,8 +98,9 @@ def make_run(log: Log, effort: str | None = None) -> Run:
     step = log.period
     samples = math.floor((log.t[-1] - log.t[0]) / step + 0.5) + 1
     grid: Values = np.asarray(log.t[0] + np.arange(samples) * step, np.float64)
-    position = np.interp(grid, log.t, log.signals["position"])
-    reference = np.interp(grid, log.t, log.signals["reference"]) if "reference" in log.signals else None
+    jumps = np.flatnonzero(log.mask(Kind.JUMPS, signals={"position"}))
+    position = np.interp(grid, log.t, joined(log.signals["position"], jumps))
+    reference = np.interp(grid, log.t, joined(log.signals["reference"], jumps)) if "reference" in log.signals else None
     values, resolution = log.signals[name], find_count(log.signals["position"])
     # What drives stands from each of its samples to the next.
     is_even = len(grid) == len(log.t) and float(np.abs(grid - log.t).max()) < 0.2 * step
@@ -109,9 +111,22 @@ def make_run(log: Log, effort: str | None = None) -> Run:
     return Run(log.name, step, position, held, usable, name, *units, reference, resolution, noise)
 
 
+def joined(values: Values, jumps: Rows) -> Values:
+    """Values whose ways to some samples are those around them: windows that are left see no jump, however wide."""
+    if not len(jumps):
+        return values
+    ways = np.diff(values)
+    for jump in jumps[jumps > 0].tolist():
+        around = np.r_[ways[max(jump - 1 - BESIDE, 0) : jump - 1], ways[jump : jump + BESIDE]]
+        ways[jump - 1] = float(np.median(around)) if len(around) else 0.0
+    return np.concatenate([values[:1], values[0] + np.cumsum(ways)])
+
+
 def _usable(log: Log, grid: Values, effort: str) -> NDArray[np.bool_]:
     """Grid samples that are not in gaps, filled in, stuck, saturated or without the drive."""
-    bad = log.mask(Kind.MISSING_VALUES, Kind.STUCK) | log.mask(Kind.SATURATED, signals={effort, "position"})
+    bad = log.mask(Kind.MISSING_VALUES, Kind.STUCK, Kind.SPIKES, Kind.JUMPS) | log.mask(
+        Kind.SATURATED, signals={effort, "position"}
+    )
     if effort in {"voltage", "command"} and "enabled" in log.signals:
         # A winding that is switched off does not brake: another axis.
         bad |= log.signals["enabled"] < 0.5

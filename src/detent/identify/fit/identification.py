@@ -14,10 +14,30 @@ from detent.identify.fit.constants import Constants, constants_of
 from detent.identify.fit.equations import LOSS, Run, make_kernel, make_run
 from detent.identify.fit.estimate import Estimate, quantile
 from detent.identify.fit.free_run import ClosedLoop, Horizon, simulate_closed_loop, simulate_horizons
-from detent.identify.fit.ladder import AT_BOUND, RUNGS, Climb, Rung, bends_tried, chosen_rung, climb, extended, fit_rung
+from detent.identify.fit.ladder import (
+    AT_BOUND,
+    RUNGS,
+    Climb,
+    Rung,
+    bends_tried,
+    chosen_climb,
+    chosen_rung,
+    climb,
+    extended,
+    fit_rung,
+)
 from detent.identify.fit.output_error import STRETCH, fit_output_error
 from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
-from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
+from detent.identify.fit.steadiness import changes_of, widen
+from detent.identify.fit.verdict import (
+    Refusal,
+    compare_methods,
+    look_at_constants,
+    look_at_fit,
+    look_at_log,
+    look_at_motion,
+    look_at_prediction,
+)
 from detent.logs.log import Log
 
 Report = Callable[[str, float], None]
@@ -144,17 +164,27 @@ def identify(
             refusals.append(Refusal("too short", "hardly any window without standstill", "record longer moves"))
         return Identification(tuple(logs), runs, None, (), (), None, (), tuple(refusals))
     climbs, fit, rivals = _fit_all(parts, runs, report)
+    changes = changes_of(parts, fit)
+    widen(fit, changes)
     constants = constants_of(fit, rivals)
-    if method == "output error" and constants.value("mass") > 0.0:
+    regressed, is_refined = constants, method == "output error" and constants.value("mass") > 0.0
+    if is_refined:
         constants = _refine(runs, constants, "output error", report)
     refusals += look_at_constants(runs[0], constants, parts)
+    refusals += look_at_fit(parts, fit, chosen_climb(climbs).error, changes)
     seen, horizons, closed = None, (), None
     if constants.value("mass") > 0.0:
         seen, horizons, closed = _test_simulation(runs, fit, chosen_rung(climbs), method, report)
+    believed = ""
+    if is_refined and seen is not None:
+        _, others, _ = _test_simulation(runs, fit, chosen_rung(climbs), "regression", report)
+        believed, told = compare_methods(runs[0], (regressed, constants), (others, horizons))
+        refusals += told
     refusals += [*look_at_prediction(climbs, horizons, refusals)]
     kernel, told = parts[0].motion.kernel, f"{runs[0].effort_name} [{runs[0].effort_unit}]"
     width = 2e3 * kernel.half * kernel.step
     notes = (f"effort: {told}", f"windows of {width:.3g} ms, {windows} of them", _WAYS[parts[0].instruments])
+    notes += (believed,) if believed else ()
     results = (constants, constants.estimates(runs[0]), climbs, fit, horizons, tuple(refusals), seen, closed, notes)
     return Identification(tuple(logs), runs, *results)
 
@@ -233,11 +263,11 @@ def _fit_all(
 ) -> tuple[tuple[Climb, ...], Fit, list[Fit]]:
     """Climb the ladder; the fit of the chosen model, and those of models as good."""
     climbs = climb(parts, _rungs_for(parts, runs), partial(report, "ladder"))
-    chosen = next(c for c in reversed(climbs) if c.taken)
+    chosen = chosen_climb(climbs)
     fits = {c.rung.name: c.fit for c in climbs if _is_rival(c, chosen)}
     if chosen.rung.is_bent and not _is_told(parts, fits[chosen.rung.name]):
         climbs = tuple(replace(c, taken=c.taken and not c.rung.is_bent) for c in climbs)
-        chosen = next(c for c in reversed(climbs) if c.taken)
+        chosen = chosen_climb(climbs)
         fits.setdefault(chosen.rung.name, chosen.fit)
     return climbs, fits.pop(chosen.rung.name), list(fits.values())
 

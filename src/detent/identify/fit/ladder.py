@@ -156,9 +156,14 @@ def climb(
     return tuple(climbs)
 
 
+def chosen_climb(climbs: Sequence[Climb]) -> Climb:
+    """The last rung that was taken, with what the stretches say of it."""
+    return next(c for c in reversed(climbs) if c.taken)
+
+
 def chosen_rung(climbs: Sequence[Climb]) -> Rung:
     """The last rung that was taken."""
-    return next(c.rung for c in reversed(climbs) if c.taken)
+    return chosen_climb(climbs).rung
 
 
 def fit_rung(parts: Sequence[regression.Prepared], rung: Rung) -> regression.Fit:

@@ -27,6 +27,7 @@ from detent.logs.log import Values
 
 STRETCH = 2.0  # length of a simulated stretch [s]
 MOST_ROUNDS = 40  # rounds of the search, at most
+AT_BOUND = 1e-3  # distance from an end of the search, in parts of its scale, at which a constant is no value
 NUDGE = 1e-4  # change of a constant for its sensitivity, in parts of its scale
 MEANT = 0.98  # share of a stretch's samples that must mean something
 SLOWEST = 0.1  # least Stribeck velocity in parts of that of the start: towards 0 the plant's rate has no bound
@@ -140,15 +141,7 @@ class _Search:
             columns = [(self.residual(at + NUDGE * unit) - middle) / NUDGE for unit in np.eye(len(at))]
             return np.column_stack(columns)
 
-        # Least and largest value of each searched constant, in parts of its scale.
-        low, high = np.zeros(len(self._searched)), np.full(len(self._searched), np.inf)
-        for k, name in enumerate(self._searched):
-            if name in _FREE:
-                low[k] = -np.inf
-            if name in {"mass", "stribeck"}:
-                low[k] = SLOWEST * abs(self.begin[k])
-            if name == "loss":
-                high[k] = MOST_LOST / self._scale[k]
+        low, high = self._limits()
         start = np.clip(x, low + 1e-6, high - 1e-6)
         accuracy = {"max_nfev": MOST_ROUNDS, "xtol": 1e-6, "ftol": 1e-8}
         found = scipy("optimize").least_squares(self.residual, start, jac=jacobian, bounds=(low, high), **accuracy)
@@ -167,8 +160,28 @@ class _Search:
         covariance = np.pad(covariance, ((0, 1), (0, 1)))
         covariance[-1, -1] = self._start.errors[self._start.names.index("delay")] ** 2
         freedom = np.full(len(covariance), float(degrees))
-        told = self._start.delay_is_told
-        return replace(self._constants(x), covariance=covariance, degrees=freedom, delay_is_told=told)
+        told, bounded = self._start.delay_is_told, self._at_bounds(x)
+        found = self._constants(x)
+        return replace(found, covariance=covariance, degrees=freedom, delay_is_told=told, bounded=bounded)
+
+    def _limits(self) -> tuple[Values, Values]:
+        """Least and largest value of each searched constant, in parts of its scale."""
+        low, high = np.zeros(len(self._searched)), np.full(len(self._searched), np.inf)
+        for k, name in enumerate(self._searched):
+            if name in _FREE:
+                low[k] = -np.inf
+            if name in {"mass", "stribeck"}:
+                low[k] = SLOWEST * abs(self.begin[k])
+            if name == "loss":
+                high[k] = MOST_LOST / self._scale[k]
+        return low, high
+
+    def _at_bounds(self, x: Values) -> tuple[str, ...]:
+        """Constants that lie at an end of what was searched: nothing in the log holds them there."""
+        low, high = self._limits()
+        ended = (x - low < AT_BOUND) | (high - x < AT_BOUND)
+        held = np.abs(self._back[:, ended]).sum(axis=1) > 0.0
+        return tuple(name for name, is_held in zip(self.names, held.tolist(), strict=True) if is_held)
 
 
 def _searched_constants(names: Sequence[str]) -> tuple[tuple[str, ...], Values]:

@@ -58,11 +58,17 @@ class Fit:
     model: tuple[str, ...]  # what the model was asked for
     condition: float  # condition number of the columns at unit length
     instruments: Instruments  # what they are made of: "reference", "position", or "none" for least squares
+    is_settled: bool = True  # False where no delay was found at which the effort asks for no other
 
     @property
     def bend(self) -> float:
         """Stribeck velocity, or share lost; 1 for a model with neither."""
         return float(self.values[-1]) if equations.is_bent(self.model) else 1.0
+
+    def error(self, name: str) -> float:
+        """Standard error of a constant."""
+        k = self.names.index(name)
+        return float(np.sqrt(max(self.covariance[k, k], 0.0)))
 
     def value(self, name: str) -> float:
         """Constant of a term; 0 where the model does not have it."""
@@ -133,7 +139,7 @@ def fit_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float =
     """Fit a model to runs; `bend` is the Stribeck velocity [m/s] or the share lost, where the model has one."""
     columns = make_columns(parts, names, bend)
     ideal = make_columns(parts, names, bend, ideal=True) if parts[0].instruments != "none" else columns
-    late, step = 0.0, parts[0].run.step
+    late, step, is_settled = 0.0, parts[0].run.step, False
     y = make_effort(parts, late)
     theta = solve(ideal, columns, y)
     x, z = _with_delay(parts, names, theta, late, columns, ideal)
@@ -141,6 +147,7 @@ def fit_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float =
         found = solve(z, x, y)
         theta = found[:-1]
         moved = float(np.clip(found[-1], -5 * step, 5 * step))
+        is_settled = abs(moved) < 5 * step
         if abs(moved) < 1e-3 * step:
             break
         late += moved
@@ -157,7 +164,17 @@ def fit_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float =
     bends = ("loss" if equations.LOSS in names else "stribeck",) if equations.is_bent(names) else ()
     told, values = (*equations.terms_of(names), "delay", *bends), [*theta.tolist(), late, *([bend] if bends else [])]
     degrees, condition = carried_degrees(x, residual, z, cosines), float(singular[0] / max(singular[-1], 1e-300))
-    return Fit(told, np.array(values), covariance, degrees, residual, y, tuple(names), condition, parts[0].instruments)
+    way = parts[0].instruments
+    return Fit(told, np.array(values), covariance, degrees, residual, y, tuple(names), condition, way, is_settled)
+
+
+def columns_of(parts: Sequence[Prepared], fit: Fit) -> tuple[Values, Values, Values]:
+    """Columns and instruments of a fit, that of the delay last, and the effort it explains."""
+    names, late = fit.model, fit.value("delay")
+    columns = make_columns(parts, names, fit.bend)
+    ideal = make_columns(parts, names, fit.bend, ideal=True) if fit.instruments != "none" else columns
+    theta = fit.values[: len(equations.terms_of(names))]
+    return *_with_delay(parts, names, theta, late, columns, ideal), make_effort(parts, late)
 
 
 def _with_delay(  # noqa: PLR0913 - all that a model consists of

@@ -9,11 +9,12 @@ import numpy as np
 
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.equations import Run
-from detent.identify.fit.estimate import Estimate, rms
+from detent.identify.fit.estimate import Estimate, quantile, rms
 from detent.identify.fit.free_run import Horizon
-from detent.identify.fit.ladder import Climb
-from detent.identify.fit.regression import Prepared
-from detent.logs.log import Kind, Log, Severity, Values
+from detent.identify.fit.ladder import Climb, chosen_climb
+from detent.identify.fit.regression import Fit, Prepared, make_effort, residuals_of
+from detent.identify.fit.steadiness import SLIGHT, Change
+from detent.logs.log import Action, Kind, Log, Severity, Values
 
 LEAST_MOTION = 1.0  # time in which the axis really moves [s], at least
 LEAST_EACH_WAY = 0.05  # share of this time in each direction, at least
@@ -24,6 +25,14 @@ WIDEST_MASS = 0.2  # half of the interval of the mass over the mass, at most
 WIDEST_FORCE = 0.15  # half of the interval of a friction or a weight over the effort that moves the axis, at most
 SAME_SPEED = 0.6  # tenth over ninth decile of the speeds of a direction, from which on they count as one speed
 WIDEST_DELAY = 10.0  # half of the interval of the delay, in samples, at most
+MOST_APART = 0.2  # what the delay does to the effort, over the effort, at most
+MOST_LATE = 2.5  # samples by which the effort may come after the motion that it causes
+COARSE = 0.1  # distance of the levels of an effort, in its size, from which it may say too little
+UNTOLD = 0.06  # residual in this distance from which it does: a command that is one of few levels is exact
+LASTING = 0.9  # correlation of neighbouring residuals from which the model misses something that lasts
+WORST_LASTING = 0.05  # error of the prediction from which that matters
+WORST_MISSED, WORST_FREE = 0.4, 0.8  # error of simulations over the travel: of half a second and more; of the free run
+BETTER_MISSED = 0.7  # such an error in that of another way to the constants, up to which it is the better one
 WORST_PREDICTION = 0.35  # error of the prediction of held-out segments over the effort, at most
 WORST_SIMULATION = 0.7  # simulated error over that of going on with the velocity of the start, at most
 _WAYS = ("positive", "negative")
@@ -33,6 +42,8 @@ _DIRT: dict[Kind, tuple[str, str]] = {
     Kind.WRONG_SIGN: ("wrong sign", "invert the signal in the mapping, as in force=-COLUMN"),
     Kind.WRONG_UNIT: ("wrong unit", "state the unit of the column in the mapping"),
     Kind.LOST_SIGN: ("lost sign", "record the signal with its sign"),
+    Kind.COPIED: ("copied column", "record what the encoder says"),
+    Kind.DROPPED_ROWS: ("lost rows", "record the time of each row with the row"),
 }
 
 
@@ -70,9 +81,14 @@ class Refusal:
 def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:
     """What is wrong with a log before anything is fitted."""
     for finding in log.findings:
-        if finding.kind in _DIRT and finding.severity is not Severity.NOTE:
+        is_clock = finding.kind is Kind.DROPPED_ROWS  # rows whose gap the time shows are only left out
+        least = (Severity.ERROR,) if is_clock else (Severity.ERROR, Severity.WARNING)
+        if finding.kind in _DIRT and finding.severity in least:
             subject, record = _DIRT[finding.kind]
             yield Refusal(subject, f"{log.name}: {finding.signal} {finding.text}", finding.advice or record)
+    if any(f.kind is Kind.REPEATED_STAMPS and f.action is Action.INTERPOLATED for f in log.findings):
+        text = f"{log.name}: time stamps are coarser than the rows"
+        yield Refusal("coarse time", text, "record the time of each row to a tenth of a period", ("delay",))
     told = {"position", run.effort_name}
     stuck = float(log.mask(Kind.STUCK, signals=told).mean())
     if stuck > MOST_STUCK:
@@ -128,7 +144,14 @@ def look_at_constants(run: Run, constants: Constants, parts: Sequence[Prepared])
     found = [*_not_told(run, by_name, effort, top)]
     refused = {name for refusal in found for name in refusal.constants}
     found += [r for r in _one_speed(run, velocity, by_name) if not refused >= set(r.constants)]
+    found += [_bounded(by_name[name]) for name in constants.bounded if name in by_name]
     return [*found, *_impossible(by_name, effort, top)]
+
+
+def _bounded(e: Estimate) -> Refusal:
+    """A constant at an end of the range that was searched for it."""
+    text = f"{e.name} {e.value:.4g} {e.unit} is an end of the range that was searched, not a value"
+    return Refusal("at a bound", text, "record moves that show it, or take the constants of the regression", (e.name,))
 
 
 def _not_told(run: Run, by_name: dict[str, Estimate], effort: float, top: float) -> Iterator[Refusal]:
@@ -183,11 +206,58 @@ def _impossible(by_name: dict[str, Estimate], effort: float, top: float) -> Iter
             yield Refusal("friction below 0", text, record, (e.name,))
 
 
+def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequence[Change]) -> Iterator[Refusal]:
+    """Whether the fit is that of one axis whose signals belong to the same moments."""
+    run, effort_as_recorded, shifted = parts[0].run, make_effort(parts, 0.0), fit.effort
+    large = [change for change in changes if change.share > SLIGHT]
+    if large:
+        most = max(large, key=lambda change: change.share)
+        ends = f"{most.mean - most.amplitude:.4g} to {most.mean + most.amplitude:.4g} {run.unit(most.name)}"
+        text = f"{most.name} changes {most.course} along the log, from {ends}: it is not of one axis and one effort"
+        record = "look for a load put on, an offset or gain of the sensor, a clock that drifts; identify parts alone"
+        yield Refusal("changes along the log", text, record)
+    delay, step = 1e3 * fit.value("delay"), 1e3 * run.step
+    half = 1e3 * quantile(float(fit.degrees[fit.names.index("delay")])) * fit.error("delay")
+    is_known = half < WIDEST_DELAY * step
+    record = "record effort and motion by one clock, unfiltered"
+    apart = rms(shifted - effort_as_recorded) / max(rms(effort_as_recorded), 1e-300)
+    if not fit.is_settled and (is_known or error > WORST_LASTING):
+        text = f"up to {delay:.3g} ms, the end of the search, no delay of the effort fits the motion best"
+        yield Refusal("delay out of range", text, record)
+    elif apart > MOST_APART:
+        text = f"{delay:.3g} ms between effort and motion, which is {apart:.0%} of the effort: a delay, or a filter"
+        yield Refusal("effort and motion are apart", text, record)
+    elif fit.instruments == "reference" and is_known and delay + half < -MOST_LATE * step:
+        text = f"the effort follows the motion that it causes by {-delay:.3g} ms: it came late, or through a filter"
+        yield Refusal("effort is late", text, record)
+    neighbours = residuals_of(fit).neighbours
+    level, effort = level_of(run.effort), rms(run.effort)
+    if level > COARSE * effort and rms(fit.residual) > UNTOLD * level:
+        text = f"{run.effort_name} has steps of {level:.3g} {run.effort_unit}, {level / effort:.0%} of its size"
+        yield Refusal("coarse effort", text, "record the effort with a finer resolution")
+    if error > WORST_LASTING and neighbours > LASTING:
+        text = f"{error:.0%} of the effort are left unexplained, for long stretches (correlation {neighbours:.2f})"
+        record = (
+            "look for a filter, a coarse sensor, or friction that depends on the place; record on one axis at a time"
+        )
+        yield Refusal("model does not explain the log", text, record)
+
+
+def level_of(effort: Values) -> float:
+    """Distance of the values of an effort from the nearest other value, the root mean square over the samples."""
+    levels, counts = np.unique(effort, return_counts=True)
+    if len(levels) < 2:
+        return 0.0
+    ways = np.diff(levels)
+    nearest = np.minimum(np.r_[np.inf, ways], np.r_[ways, np.inf])
+    return float(np.sqrt(np.sum(counts * nearest**2) / len(effort)))
+
+
 def look_at_prediction(
     climbs: Sequence[Climb], horizons: Sequence[Horizon], refused: Sequence[Refusal]
 ) -> Iterator[Refusal]:
     """Whether the model explains what it did not see; without a mass that is known it cannot be simulated."""
-    chosen = next(c for c in reversed(climbs) if c.taken)
+    chosen = chosen_climb(climbs)
     if not chosen.error < WORST_PREDICTION:
         text = f"the effort on held-out segments is predicted with an error of {chosen.error:.0%}"
         record = "check that the effort is what drives this axis, and its sign, unit and delay"
@@ -199,3 +269,53 @@ def look_at_prediction(
         h = tested[-1]
         text = f"simulated over {h.name} its error is {h.rms:.3g}, constant velocity gives {h.naive:.3g}"
         yield Refusal("model does not explain the log", text, "record with more acceleration, or check the units")
+        return
+    yield from _far_off(horizons)
+
+
+def _far_off(horizons: Sequence[Horizon]) -> Iterator[Refusal]:
+    """A simulation that leaves the log by more than constants that are nearly right can make it."""
+    off, free = missed(horizons), [h for h in horizons if h.name == "free run" and h.moved > 0.0]
+    if off > WORST_MISSED or any(h.rms > WORST_FREE * h.moved for h in free):
+        told = ", ".join(f"{h.rms / h.moved:.0%} over {h.name}" for h in _long(horizons))
+        text = f"simulated from the effort alone, the axis misses its travel by {told}"
+        record = "fit the simulation itself, --method output-error; or record each direction at several speeds"
+        yield Refusal("simulation is far off", text, record)
+
+
+def _long(horizons: Sequence[Horizon]) -> list[Horizon]:
+    """Horizons over which constants show: half a second and more."""
+    return [h for h in horizons if h.name not in {"one step", "0.1 s"} and h.moved > 0.0]
+
+
+def missed(horizons: Sequence[Horizon]) -> float:
+    """By how much simulations of half a second and more miss, over the travel: the median; 0 where there is none."""
+    shares = [h.rms / h.moved for h in _long(horizons)]
+    return float(np.median(shares)) if shares else 0.0
+
+
+def compare_methods(
+    run: Run, ways: tuple[Constants, Constants], horizons: tuple[Sequence[Horizon], Sequence[Horizon]]
+) -> tuple[str, list[Refusal]]:
+    """Which of two ways to believe where their intervals are disjoint, in a sentence; refused where neither is better.
+
+    The regression comes first, the simulation fit second, whose constants are given.
+    """
+    known = {e.name: e for e in ways[0].estimates(run)}
+    pairs = [(known[e.name], e) for e in ways[1].estimates(run) if e.name in known and e.name != "delay"]
+    apart = [(a, b) for a, b in pairs if a.low > b.high or b.low > a.high]
+    if not apart:
+        return "", []
+    told = ", ".join(
+        f"{a.name} {a.value:.4g} +- {a.half:.2g} and {b.value:.4g} +- {b.half:.2g} {b.unit}" for a, b in apart
+    )
+    by, other = missed(horizons[1]), missed(horizons[0])
+    both = f"regression and simulation fit disagree: {told}"
+    if 0.0 < by < BETTER_MISSED * other:
+        return (
+            f"{both}; the simulation fit misses held-out travel by {by:.0%}, the regression by {other:.0%}: use it",
+            [],
+        )
+    why = f"{both}; held-out travel is missed by {other:.0%} and {by:.0%}, which does not decide between them"
+    record = "record slower and faster moves; where the regression predicts better, leave --method out"
+    return "", [Refusal("two ways disagree", why, record, tuple(b.name for _, b in apart))]

@@ -232,6 +232,7 @@ def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> 
     moved = count - c.count
     c.count = count
     watch_number(p.guard, c.guard, error)
+    watch_number(p.guard, c.guard, c.law.command)
     weigh_effort(c.weighing, c.guard, c.law.command, moved)
     return watch(p.guard, c.guard, late, side, c.law.limited > 0, pushing, moved)
 

@@ -14,7 +14,7 @@ hangs does so near its lowest place.
 """
 
 import math
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -31,7 +31,7 @@ from detent.analysis.linear_system import (
     margins_of,
     usual_frequencies,
 )
-from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.cascade.schema import CascadeSpec, EncoderTable
 from detent.plant.linear_two_mass import linear_plant
 
 Numbers = NDArray[np.float64]
@@ -115,12 +115,30 @@ class LinearLoop:
     @cached_property
     def held(self) -> tuple[Numbers, Numbers]:
         """Ad and Bd: the plant from sample to sample."""
+        return self._held(self.plant.b)
+
+    @cached_property
+    def loaded(self) -> Numbers:
+        """What a force of 1 N on the load adds to the state in a sample."""
+        force = np.zeros_like(self.plant.b)
+        coupled = self.plant.load != self.plant.motor
+        force[self.plant.load + 1] = 1.0 / (self.spec.mechanics.load_mass if coupled else self.spec.mass)
+        return self._held(force)[1]
+
+    def _held(self, driven: Numbers) -> tuple[Numbers, Numbers]:
         expm: Any = import_module("scipy.linalg").expm
-        size = len(self.plant.b)
+        size = len(driven)
         a = np.zeros((size + 1, size + 1))
-        a[:size, :size], a[:size, size] = self.plant.a, self.plant.b
+        a[:size, :size], a[:size, size] = self.plant.a, driven
         whole = expm(a * self.period)
         return whole[:size, :size], whole[:size, size]
+
+    @cached_property
+    def sensors(self) -> dict[str, EncoderTable]:
+        """The encoders of the loops, by the place at which what each is off by is put in."""
+        if self.position_sensor is self.velocity_sensor:
+            return {"counts of the position": self.position_sensor}
+        return {"counts of the position": self.position_sensor, "counts of the velocity": self.velocity_sensor}
 
     def transition(self, more: float = 1.0) -> Numbers:
         """State from sample to sample, the reference at 0, with `more` times the gain.
@@ -139,7 +157,13 @@ class LinearLoop:
         """The loop that is cut open at a place, as matrices."""
         after, out = self._sample(cut)
         a, b, c, d = after[:, :-1], after[:, -1:], out[None, :-1], out[None, -1:]
-        return LinearSystem(a=a, b=b, c=c, d=d, dt=self.period, name=f"{cut} loop")
+        quick = partial(self._cut_open, cut) if cut in self.cuts else None
+        return LinearSystem(a=a, b=b, c=c, d=d, dt=self.period, name=f"{cut} loop", quick=quick)
+
+    def _cut_open(self, cut: str, frequencies: Numbers) -> Phasors:
+        """The same at frequencies [Hz], as a sum over the modes of the plant."""
+        inner, outer = self._open_loops(frequencies)
+        return {"velocity": inner, "position": outer}.get(cut, inner + outer * (1.0 + inner))
 
     @property
     def edge(self) -> EdgeCycle | None:
@@ -151,7 +175,8 @@ class LinearLoop:
         """What a sample makes of the state and of what is put in at a cut: the state after it, and what comes out.
 
         Quantities of a sample are rows over the state before it and, last, what is put in. Cut at the encoder, the
-        place that it is to read and the command come out.
+        place that it is to read and the command come out. Where all loops stay closed, a force on the "load" moves it,
+        and what an encoder is off by ("counts of the position", "counts of the velocity") moves the command.
         """
         read = self.velocity_sensor
         sizes = [len(self.plant.b), self.position_sensor.delay, read.delay + read.velocity_span, self.spec.drive.delay]
@@ -159,8 +184,9 @@ class LinearLoop:
         x, positions, places, commands, rest = parts
         velocity, integral, filtered, put_in = rest
         at_encoder, shared = cut == "encoder", self.position_sensor is self.velocity_sensor
-        positions = np.vstack([put_in if at_encoder else x[self.position_place], positions])
-        places = np.vstack([put_in if at_encoder and shared else x[self.velocity_place], places])
+        off = [put_in if self.sensors.get(cut) is one else 0.0 * put_in for one in (self.position_sensor, read)]
+        positions = np.vstack([put_in if at_encoder else x[self.position_place] + off[0], positions])
+        places = np.vstack([put_in if at_encoder and shared else x[self.velocity_place] + off[1], places])
         difference = (places[read.delay] - places[-1]) / (read.velocity_span * self.period)
         velocity = velocity + self.velocity_share * (difference - velocity)
         position_meas = {"position": put_in, "velocity": 0.0 * put_in}.get(cut, positions[-1])
@@ -168,9 +194,11 @@ class LinearLoop:
         command, integral, filtered = self._law(position_meas, velocity_meas, integral, filtered)
         out = -{"position": positions[-1], "velocity": velocity}.get(cut, command)
         out = np.vstack([x[self.position_place], command]) if at_encoder else out
+        out = x[self.plant.load] if cut == "load" else command if cut in self.sensors else out
         commands = np.vstack([put_in if cut == "command" else command, commands])
         held, driven = self.held
         plant = held @ x + np.outer(driven, more * self.gain * commands[-1])
+        plant += np.outer(self.loaded, put_in) if cut == "load" else 0.0
         after: Any = np.vstack([plant, positions[:-1], places[:-1], commands[:-1], velocity, integral, filtered])
         return after, out
 
@@ -260,15 +288,25 @@ class LinearLoop:
         """Both positions of the plant that are read, to what the amplifier puts out; by its modes where they differ."""
         held, driven = self.held
         places = [self.position_place, self.velocity_place]
-        modes, vectors = np.linalg.eig(held)
-        if np.linalg.cond(vectors) < WELL_APART:
-            shares = vectors[places] * np.linalg.solve(vectors, driven.astype(np.complex128))
+        modes, shares = self._modes
+        if shares is not None:
             found: Any = (1.0 / (z[:, None] - modes)) @ shares.T
         else:  # without drag the position sums up what is summed up already
             through = z[:, None, None] * np.eye(len(driven)) - held
             put_in = np.broadcast_to(driven[:, None], (len(z), len(driven), 1)).astype(np.complex128)
             found = np.linalg.solve(through, put_in)[:, places, 0]
         return found[:, 0], found[:, 1]
+
+    @cached_property
+    def _modes(self) -> tuple[Phasors, Phasors | None]:
+        """Modes of the plant from sample to sample, and their shares in both places that are read; None if alike."""
+        held, driven = self.held
+        modes, vectors = np.linalg.eig(held)
+        if np.linalg.cond(vectors) >= WELL_APART:
+            return modes, None
+        places = [self.position_place, self.velocity_place]
+        shares: Any = vectors[places] * np.linalg.solve(vectors, driven.astype(np.complex128))
+        return modes, shares
 
     def velocity_level(self, frequency: float) -> float:
         """Gain of the open velocity loop at a frequency [Hz] below half the sample rate."""

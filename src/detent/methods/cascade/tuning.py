@@ -28,7 +28,8 @@ from detent.analysis.linear_system import largest_level
 from detent.methods.cascade.checks import LARGEST_JUMP, directions
 from detent.methods.cascade.derive import CascadeFigures
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.tuning import DIGITS, Bounds, Share, Tuning, digits
+from detent.methods.tuning import DIGITS, Bounds, Response, Share, Tuning, digits
+from detent.units import format_quantity
 
 Numbers = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
@@ -44,6 +45,13 @@ ROUNDS, PLACES = 4, 7  # of looking closer at the best, and places each way
 FRONT = (0.7, 0.5, 0.35, 0.25)  # of the largest J: the quieter gains of which the quickest are chosen
 WITHIN = 1.002  # of their bounds, where the gains of the file lie that nothing quieter replaces
 EXACT = 12  # plants of which the worst bound is looked at exactly
+CLOSE = 0.99  # of its bound, from which one decides
+NEAR = 0.2  # of the frequency of the resonance, within which a peak is its
+BOUNDS = (
+    "a count of the velocity moves the command by {0:.0f} % of its largest",
+    "Ms at the command is {0:.3g} at {1}", "the overshoot is {0:.3g} at {1}", "Ms at the velocity is {0:.3g} at {1}",
+)  # fmt: skip
+"""What is bounded, in words, with its value and the frequency of it."""
 
 
 class Gains:
@@ -61,6 +69,24 @@ class Gains:
         """Some of them."""
         return Gains(self.kp[which], self.kv[which], self.ki[which])
 
+    @property
+    def pid(self) -> tuple[Numbers, Numbers, Numbers]:
+        """Proportional, integral and derivative gain of the PID with the same law at the command."""
+        return self.kv * self.kp + self.ki, self.ki * self.kp, self.kv
+
+
+class PidGains(Gains):
+    """A PID as a file has it: its zeros need not be real, as those of a cascade are."""
+
+    def __init__(self, proportional: float, derivative: float, integral: float) -> None:
+        super().__init__(math.nan, derivative, integral)
+        self.proportional = np.array([proportional], np.float64)
+
+    @property
+    def pid(self) -> tuple[Numbers, Numbers, Numbers]:
+        """As they are stated."""
+        return self.proportional, self.ki, self.kv
+
 
 class Plant:
     """What the gains act on: responses on a grid, and exact ones where they are asked for."""
@@ -71,6 +97,12 @@ class Plant:
         share = self.loop.velocity_share * figures.counted_velocity * (self.loop.derivative_share if self.pid else 1.0)
         #: Kv by which one count of the velocity moves the drive as far as it may
         self.most_gain = LARGEST_JUMP * spec.largest_command / share if share > 0.0 else math.inf
+
+    @cached_property
+    def resonance(self) -> float:
+        """The masses swing against one another on their coupling [Hz]; 0 for a rigid axis."""
+        modes = np.linalg.eigvals(self.loop.plant.a) / math.tau
+        return float(np.abs(modes[np.argmax(modes.imag)])) if np.any(modes.imag > 0.0) else 0.0
 
     @cached_property
     def frequencies(self) -> Numbers:
@@ -96,7 +128,8 @@ class Plant:
         position, velocity, summed = paths
         kp, kv, ki = g.kp[:, None], g.kv[:, None], g.ki[:, None]
         if self.pid:
-            outer, inner = (kv * kp + ki + ki * kp * summed) * position, kv * velocity
+            proportional, integral, derivative = (one[:, None] for one in g.pid)
+            outer, inner = (proportional + integral * summed) * position, derivative * velocity
         else:
             law = kv + ki * summed
             outer, inner = law * (kp * position), law * velocity
@@ -110,23 +143,25 @@ class Plant:
 
     def worst(self, g: Gains, bounds: Bounds) -> float:
         """The same of one candidate, each peak looked at closer; infinite where it does not settle."""
-        if not self.settles(g)[0]:
-            return math.inf
+        return max(level for level, _ in self.exactly(g, bounds)) if self.settles(g)[0] else math.inf
+
+    def exactly(self, g: Gains, bounds: Bounds) -> list[tuple[float, float]]:
+        """By how much one candidate exceeds each of its bounds, in the order of `BOUNDS`, and where that is [Hz]."""
         levels = self._ratios(g, bounds, self.paths)[:, 0]
-        found = [g.kv[0] / self.most_gain]
+        found = [(float(g.kv[0]) / self.most_gain, math.nan)]
         for k in range(3):
 
             def level(at: Numbers, k: int = k) -> Numbers:
                 return self._ratios(g, bounds, self.loop.paths(at))[k, 0]
 
-            found.append(largest_level(level, self.frequencies, levels[k])[0])
-        return float(max(found))
+            found.append(largest_level(level, self.frequencies, levels[k]))
+        return found
 
     def settles(self, g: Gains) -> NDArray[np.bool_]:
         """Whether every mode decays, shape (n,)."""
         bare, *parts = self._transitions
-        gains = (g.kv * g.kp + g.ki, g.ki * g.kp, g.kv) if self.pid else (g.kv, g.ki, g.kv * g.kp, g.ki * g.kp)
-        whole = np.repeat(bare[None], len(g.kp), axis=0)
+        gains = g.pid if self.pid else (g.kv, g.ki, g.kv * g.kp, g.ki * g.kp)
+        whole = np.repeat(bare[None], len(g.kv), axis=0)
         for gain, part in zip(gains, parts, strict=True):
             whole += gain[:, None, None] * part
         whole[g.ki == 0.0, :, -2] = 0.0  # an integral that nobody uses stays where it is
@@ -322,14 +357,21 @@ class CascadeTuning(Tuning):
         found = Search([self.plant(spec) for spec in plants], bounds, short, least).best()
         return self.values_of(found) if found is not None else {}
 
+    def gains_of(self, values: Mapping[str, float]) -> Gains:
+        """Gains of the file as a candidate."""
+        return (PidGains if self.pid else Gains)(*(values[key] for key in self.keys))
+
     def values_of(self, g: Gains) -> dict[str, float]:
         """Gains as the file has them."""
         kp, kv, ki = float(g.kp[0]), float(g.kv[0]), float(g.ki[0])
-        return dict(zip(self.keys, (kv * kp + ki, kv, ki * kp) if self.pid else (kp, kv, ki), strict=True))
+        if self.pid:
+            proportional, integral, derivative = (float(one[0]) for one in g.pid)
+            return dict(zip(self.keys, (proportional, derivative, integral), strict=True))
+        return dict(zip(self.keys, (kp, kv, ki), strict=True))
 
     def worst(self, plants: Sequence[CascadeSpec], values: Mapping[str, float], bounds: Bounds) -> list[float]:
         """By how much each plant exceeds the worst of its bounds; those near the worst of them exactly."""
-        g = Gains(*(values[key] for key in self.keys))
+        g = self.gains_of(values)
         made = [self.plant(spec) for spec in plants]
         levels = [float(plant.levels(g, bounds)[0]) for plant in made]
         near = sorted(range(len(made)), key=lambda k: -levels[k])[:EXACT]
@@ -355,9 +397,68 @@ class CascadeTuning(Tuning):
         times = [move.settling for move in result.moves]
         return max(times, default=math.inf) if result.done and not any(map(math.isnan, times)) else math.inf
 
+    def limits(self, plant: CascadeSpec, values: Mapping[str, float], bounds: Bounds) -> str:
+        """Bounds that are reached, with the resonance where it is that."""
+        made, g = self.plant(plant), self.gains_of(values)
+        scales = 100.0 * LARGEST_JUMP, bounds.sensitivity, bounds.overshoot, bounds.sensitivity
+        found = list[str]()
+        for text, scale, (level, at) in zip(BOUNDS, scales, made.exactly(g, bounds), strict=True):
+            if level >= CLOSE:
+                found.append(text.format(scale * level, format_quantity(at, "Hz", 3) if at > 0.0 else ""))
+                if abs(at - made.resonance) < NEAR * made.resonance:
+                    found[-1] += f", near the resonance of the coupling ({format_quantity(made.resonance, 'Hz', 3)})"
+        return "; ".join(found)
+
+    def easier(self, plant: CascadeSpec) -> list[tuple[str, CascadeSpec]]:
+        """A stiffer or better damped coupling, less dead time, a finer encoder."""
+        return list(_easier(plant))
+
+    def figures(self, plant: CascadeSpec) -> dict[str, str]:
+        """Stiffness, compliance, noise and steady error."""
+        from detent.methods.cascade.tried import loop_figures
+
+        return dict(loop_figures(plant))
+
+    def responses(self, plant: CascadeSpec) -> Sequence[Response]:
+        """A push on the load, and a step of the reference."""
+        from detent.methods.cascade.tried import responses
+
+        return responses(plant)
+
+    def followed(self, plant: CascadeSpec, job: Any) -> Response:
+        """Error of the position loop during a job."""
+        from detent.methods.cascade.tried import followed
+
+        return followed(plant, job)
+
     def shares(self, stated: Container[str], known: Mapping[str, float]) -> list[Share]:
         """All of what is stated, of Coulomb friction as much as is known, and nothing of what is not."""
         return list(_shares(self.spec, stated, known))
+
+
+def _easier(spec: CascadeSpec) -> Iterator[tuple[str, CascadeSpec]]:
+    coupling, drive = spec.mechanics.coupling, spec.drive
+    if coupling is not None:
+        stiff = format_quantity(2.0 * coupling.stiffness, spec.unit("N") + "/" + spec.unit("m"), 3)
+        texts = f"a coupling twice as stiff, {stiff},", "a coupling with twice the damping"
+        for text, name in zip(texts, ("stiffness", "damping"), strict=True):
+            made = coupling.model_copy(update={name: 2.0 * getattr(coupling, name)})
+            yield text, spec.changed(mechanics={"coupling": made})
+    table = "encoder" if spec.encoder_of("velocity") is spec.encoder else "load_encoder"
+    read = spec.encoder_of("velocity")
+    if drive.delay:
+        yield "an amplifier that is a sample sooner", spec.changed(drive={"delay": drive.delay - 1})
+    elif read.delay:
+        yield "an encoder that is a sample sooner", spec.changed(**{table: {"delay": read.delay - 1}})
+    elif read.velocity_filter > 0.0:
+        half = 0.5 * read.velocity_filter
+        made = spec.changed(**{table: {"velocity_filter": half}})
+        yield f"a velocity filter of {format_quantity(half, 's', 3)}", made
+    else:
+        half = 0.5 * spec.method.sample_period
+        yield f"a sample period of {format_quantity(half, 's', 3)}", spec.changed(method={"sample_period": half})
+    if read.resolution > 0.0:
+        yield "an encoder with half the count", spec.changed(**{table: {"resolution": 0.5 * read.resolution}})
 
 
 def _shares(spec: CascadeSpec, stated: Container[str], known: Mapping[str, float]) -> Iterator[Share]:

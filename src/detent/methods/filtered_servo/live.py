@@ -137,7 +137,7 @@ def serve(  # noqa: PLR0913 - as all of its kind
     a.refused = 0
     if d.fresh:
         if d.do == REST_OFF and c.deviation.state != FAULT:
-            c.deviation.state, c.busy = RESET, 1
+            c.deviation.state, c.busy, g.goal = RESET, 1, g.command  # nothing is commanded any more
         elif d.do == HOLD:
             reset(c)
         elif d.do == TRAVEL:

@@ -21,8 +21,9 @@ export function open(root, { link }) {
   const said = h("p", { role: "status" });
   let frame = 0;
   plot.show([{ name: "counted, scaled", unit: "count" }, { name: "filtered", unit: "count" }]);
-  root.append(h("h1", {}, "Counted and filtered speed"), plot.root,
-    h("p", { class: "hint" }, h("span", { class: "swatch c0", "aria-hidden": true }), "counted in a sample, in steps; ", h("span", { class: "swatch c1", "aria-hidden": true }), "behind the filter, smooth and a little late."),
+  root.append(h("h1", {}, "Counted and filtered speed"),
+    h("p", { class: "hint" }, "The speed is the number of pulses in a sample: ", h("span", { class: "swatch c0", "aria-hidden": true }), "as counted, in steps; ", h("span", { class: "swatch c1", "aria-hidden": true }), "behind the filter, smooth and a little late."),
+    plot.root,
     h("dl", { class: "cards" }, pairs.map(({ row }) => row)), said);
   const draw = () => {
     frame = 0;

@@ -222,11 +222,11 @@ def live(spec: PhaseServoSpec, operation: Callable[..., OperationParams]) -> dic
     machine: Any = host.machine
     machine.params.controller.guard.softly = SOFT
     memory = PhaseLive(base=begin, position=begin)
-    cycle = machine.params.controller.converters.absolute.mask + 1
+    cycle = int(machine.params.controller.converters.absolute.mask) + 1
     return {
         "": Live(
             machine.params, machine.state, q, memory, machine.tick, speed=speed,
-            view={"title": "Phase", "data": {"cycle": int(cycle)}}, fault=lambda: host.failure,
+            view={"title": "Phase", "data": {"cycle": cycle, "stop": cycle // 2}}, fault=lambda: host.failure,
             legs=legs_of, places=places(spec, spec.tick), limits={STUCK: spec.protection.stuck_effort, SATURATED: 1.0},
         )
     }  # fmt: skip

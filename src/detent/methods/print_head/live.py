@@ -53,7 +53,7 @@ from detent.kernel.step import hot_step, step
 from detent.methods.method import Live
 from detent.methods.print_head.controller import PrintHeadController, PrintHeadLines
 from detent.methods.print_head.faults import places
-from detent.methods.print_head.line_plan import RESERVE
+from detent.methods.print_head.line_plan import EMITTERS_PER_COLUMN, RESERVE
 from detent.methods.print_head.print_job import parse_text
 from detent.methods.print_head.printed_page import PrintJob
 from detent.methods.print_head.run import NOT_FIRED, Printing, PrintRun, inked, line_commands, print_head_machine
@@ -420,6 +420,7 @@ class HeadWork:
         self.printing.plan()
         self.printing.landed[:] = NOT_FIRED
         self._preselected, self._laid, self._booked = int(params.controller.print_speed), 0, 0
+        self._column0, self._shown = params.controller.columns.column_zero / 256, dict[str, Any]()
 
     @property
     def pieces(self) -> int:
@@ -430,6 +431,18 @@ class HeadWork:
     def done(self) -> int:
         """Lines that are printed."""
         return min(int(self.memory.done), self._laid)
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        """The line under way: its number, its direction, and its glyphs, each with its left edge and width [m]."""
+        if self.done >= self.pieces:
+            return {}
+        plan = self.printing.plans[self.done]
+        if plan.line.number != self._shown.get("line"):
+            wide, zero = EMITTERS_PER_COLUMN * EMITTER, self._column0 * EMITTER
+            ink = [[c.char, zero + c.column * wide, c.ink_columns * wide] for c in plan.line.characters]
+            self._shown = {"line": plan.line.number, "direction": plan.direction, "ink": ink}
+        return self._shown
 
     def piece(self) -> bytes | None:
         """The next line, once its bank of the line buffer and its place in the tray are free."""

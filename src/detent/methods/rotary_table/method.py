@@ -39,6 +39,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     stands = "standstill:TableEnsemble"
     leaves_out = ("Neglected: saturation, quantization, friction that is not viscous.",)
     lives = "live:live"
+    wires, machines = "wired:wired", "wired:machine"
     compares = ("comparison:compare_angle",)
     sums_up, reports = "summary:sequence_summary_rows", "page:table_page"
     says = "{job}: every step was done on {axis}.", "Not done: {failure}"

@@ -20,11 +20,11 @@ export function open(root, { link }) {
   const rows = SHOWN.map(([name, text]) => [name, pair(text)]);
   const said = h("p", { role: "status" });
   root.append(h("h1", {}, "Dial"),
-    h("svg", { viewBox: "0 0 302 304", class: "drawing narrow", role: "img", "aria-label": "Dial; the angle stands beside it" },
+    h("p", { class: "hint" }, "Solid: where the table is. Dashed: where it is sent. The triangle is the wrap: there the sensor begins again at 0, and the count goes on."),
+    h("div", { class: "beside" }, h("svg", { viewBox: "0 0 302 304", class: "drawing narrow", role: "img", "aria-label": "Dial; the angle stands beside it" },
       h("circle", { cx: 150, cy: 150, r: 130, class: "faint" }), marks, names,
       h("path", { d: "M150 20 l-8 -14 h16 z", class: "dot" }), wanted, hand),
-    h("p", { class: "hint" }, "Solid: where the table is. Dashed: where it is sent. The triangle is the wrap: there the count goes on while the sensor begins again at 0."),
-    h("dl", { class: "cards" }, angle.row, turns.row, rows.map(([, { row }]) => row)), said);
+    h("dl", { class: "cards" }, angle.row, turns.row, rows.map(([, { row }]) => row))), said);
   const turned = (value) => (((value % TURN) + TURN) % TURN);
   const leave = follow(link, SHOWN.map(([name]) => name), (values) => {
     if (values.error) return say(said, values.error);

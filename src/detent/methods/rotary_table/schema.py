@@ -9,7 +9,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from detent.axisfile.tables import AxisSpec, AxisTable, TurnProtectionTable, breaking_effort, usual_stiction
+from detent.axisfile.tables import (
+    AxisSpec,
+    AxisTable,
+    HardwareTable,
+    TurnProtectionTable,
+    breaking_effort,
+    usual_stiction,
+)
 from detent.files.fields import Naming, Table, named, optional, required
 from detent.files.quantities import (
     Angle,
@@ -225,6 +232,7 @@ class RotaryTableSpec(AxisSpec, frozen=True):
     position: dict[str, PositionTable] = named("a position by its number", POSITION_NUMBER, start=True, max_length=128)
     protection: TableProtectionTable = Field(default_factory=TableProtectionTable)
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
+    hardware: HardwareTable | None = None
 
     @property
     def ratio(self) -> int:

@@ -136,6 +136,12 @@ def step_once(p: StepperControllerParams, c: StepperController, entry: int) -> i
 
 
 @hot_step
+def step_along(p: StepperControllerParams, c: StepperController, up: i2_signal, down: i2_signal) -> int:
+    """The running period is over: read the next entry, decide, and begin the next one. Returns IDLE, STEP or PAUSE."""
+    return step_once(p, c, next_entry(c.rule, up, down))
+
+
+@hot_step
 def put_out(c: StepperController, lines: StepperLines, outcome: int) -> bool:
     """Drive the lines as it was decided; False at rest."""
     lines.pulse = outcome == STEP
@@ -151,7 +157,7 @@ def next_period(
     """The running period is over: begin the next one, and drive the lines; False at rest."""
     if c.timer.period == 0:
         c.timer.expires = c.now  # at rest time passes until a start, which takes effect at once
-    return put_out(c, lines, step_once(p, c, next_entry(c.rule, up, down)))
+    return put_out(c, lines, step_along(p, c, up, down))
 
 
 @controls(StepperControllerParams)

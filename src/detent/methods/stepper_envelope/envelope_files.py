@@ -20,14 +20,13 @@ from numpy.typing import NDArray
 
 from detent.axisfile.motion import unit_in
 from detent.control import step_rule
-from detent.control.step_rule import StepRule
-from detent.control.step_timer import StepTimer
 from detent.files.marks import IN_C, signed
 from detent.files.screen import OnScreen
 from detent.files.text import check_target, shown, write_text
 from detent.kernel.registers import Registers
 from detent.methods.stepper_envelope.build import make_tables
 from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
+from detent.methods.stepper_envelope.rule_in_c import narrowed, rule_program, rule_text, structures
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.summary import units_of
 from detent.page.parts import Numbers
@@ -83,9 +82,15 @@ class EnvelopeTables(OnScreen):
 
         They are frequencies [Hz], or with reload words periods [tick].
         """
-        p, limits = StepperControllerParams(), self.up.zones.limits
-        load_rule(p, self.up.ramp, limits, self.clock_hz, reload=self.reload)
-        return np.array(p.rule.ramp[: len(self.up.ramp)], np.int64), np.array(p.rule.limit[: len(limits)], np.int64)
+        p = self.parameters()
+        ramp, limit = p.rule.ramp[: len(self.up.ramp)], p.rule.limit[: len(self.up.zones.limits)]
+        return np.array(ramp, np.int64), np.array(limit, np.int64)
+
+    def parameters(self) -> StepperControllerParams:
+        """What the control unit of this motor is set to."""
+        p = StepperControllerParams(pause=self.pause)
+        load_rule(p, self.up.ramp, self.up.zones.limits, self.clock_hz, reload=self.reload)
+        return p
 
     @property
     def word_bytes(self) -> int:
@@ -182,14 +187,9 @@ def paged(tables: EnvelopeTables) -> Paged:
 
 
 def register_types(tables: EnvelopeTables, registers: type[Registers]) -> dict[str, str]:
-    """C type of each register, as wide as its values need; what only grows wraps at 32 bits.
-
-    Only a motor in fault goes beyond the ends of its travel, by a ramp at most.
-    """
-    near = tables.steps + len(tables.up.ramp) <= np.iinfo(np.int16).max
-    needed = {"period": "int32_t", "expires": "uint32_t", "pulses": "uint32_t"}
-    needed["position"] = "int16_t" if near else "int32_t"
-    return {leaf.path: needed.get(leaf.path, leaf.width.c_name) for leaf in registers.leaves()}
+    """C type of each register, as wide as its values need."""
+    needed = narrowed(tables.steps, len(tables.up.ramp), 0)
+    return {leaf.path: needed.get((registers, leaf.path), (leaf.width,))[0].c_name for leaf in registers.leaves()}
 
 
 def write_envelope_header(tables: EnvelopeTables, path: str | Path, *, force: bool = False) -> None:
@@ -213,7 +213,8 @@ def _header(tables: EnvelopeTables) -> str:
     template = resources.files("detent.methods.stepper_envelope").joinpath("step_rule.h.in").read_text(encoding="utf-8")
     ramp, limit = tables.words()
     wide = tables.word_bytes > 2
-    parts, types = paged(tables), register_types(tables, StepRule) | register_types(tables, StepTimer)
+    parts, at = paged(tables), "uint16_t" if tables.steps <= np.iinfo(np.uint16).max else "uint32_t"
+    program = rule_program(tables.motor, tables.parameters(), tables.steps, len(limit), at)
     return environment.from_string(template).render(
         tables=tables,
         motor=tables.motor,
@@ -229,13 +230,11 @@ def _header(tables: EnvelopeTables) -> str:
         number=f"uint{8 * parts.number_bytes}_t",
         word="int32_t" if wide else "uint16_t",
         read="dword" if wide else "word",
-        types=types,
-        place=types["position"],
-        at="uint16_t" if tables.steps <= np.iinfo(np.uint16).max else "uint32_t",
+        structures=structures(program),
+        rule=rule_text(program),
+        at=at,
         index_mask=f"0x{INDEX_MASK:04X}",
         index_bits=INDEX_BITS,
-        rule=StepRule,
-        timer=StepTimer,
         code=step_rule,
         mark=MARK,
     )

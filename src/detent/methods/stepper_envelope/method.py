@@ -41,6 +41,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     interrupts = ("next_period",)
     every = 100
     takes, runs = "stage_job:StageJob", "run:run_stage"
+    searches = "tuning:StageSearch"
     lives = "live:live"
     rests = "the field of its windings holds the rotor"
     sums_up, reports = "summary:stage_summary_rows", "page:stage_page"

@@ -17,14 +17,15 @@ export function open(root, { link }) {
   const zones = speeds.map((speed, k) => `${k ? "L" : "M"}${x(edges[k])} ${y(speed)}H${x(edges[k + 1])}`).join("");
   const point = h("circle", { r: 7, class: "dot" });
   const trail = h("path", { d: "", class: "ref" });
-  const title = h("text", { x: LEFT, y: 222 });
+  const title = h("text", { x: LEFT, y: 228 });
   const rows = SHOWN.map(([name, text]) => [name, pair(text)]);
   const said = h("p", { role: "status" });
   let points = [];
   root.append(h("h1", {}, "Envelope"),
-    h("svg", { viewBox: "0 0 580 232", class: "drawing wide", role: "img", "aria-label": "Permitted speed over the travel with the moving point; both stand below" },
-      h("path", { d: `M${LEFT} ${TOP}V${BOTTOM}H${RIGHT}`, class: "faint" }), h("path", { d: zones, class: "ink" }), trail, point, title),
-    h("p", { class: "hint" }, "The line is what the zones allow, the point the motor: across its place, up its speed. Near an end it comes down its ramp."),
+    h("p", { class: "hint" }, "The line is the speed that is permitted at each place, the point the motor: it stays under the line, and before a narrow place or an end it comes down its ramp."),
+    h("svg", { viewBox: "0 0 580 240", class: "drawing wide", role: "img", "aria-label": "Permitted speed over the travel with the moving point; both stand below" },
+      h("path", { d: `M${LEFT} ${TOP}V${BOTTOM}H${RIGHT}`, class: "wire" }), h("path", { d: zones, class: "ink" }), trail, point,
+      h("text", { x: LEFT + 6, y: TOP + 4, class: "soft" }, "speed"), h("text", { x: RIGHT, y: BOTTOM - 8, "text-anchor": "end", class: "soft" }, "place"), title),
     h("dl", { class: "cards" }, rows.map(([, { row }]) => row)), said);
   const leave = follow(link, SHOWN.map(([name]) => name), (values) => {
     if (values.error) return say(said, values.error);

@@ -109,7 +109,7 @@ class CanopenDrive:
         if abs(turn - w.turn) > 1e-6 * turn:
             raise DetentError(
                 f"canopen:{self.address}: got {turn:g} counts in a turn of the motor (608F); expected: {w.turn:g}, as "
-                "the axis file has it; correct its encoder.resolution or mechanics.travel_per_revolution"
+                f"the axis file has it; correct its {w.turn_key}, or set the drive"
             )
         modes = sdo[c.MODES].raw
         if not modes & self._cyclic.bit:

@@ -7,6 +7,7 @@ together with why the axis may not be enabled. The plant of the file needs none:
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from operator import attrgetter
@@ -141,9 +142,9 @@ class Link:
         if self.driver.read(lines):
             self._ends.say(self.bar, self.driver.fault)
 
-    def start(self) -> None:
-        """Exchange in a thread, once in a period of the loop."""
-        self._thread = threading.Thread(target=self._run, name="driver", daemon=True)
+    def start(self, supervised: Callable[[Callable[[], None]], Callable[[], None]]) -> None:
+        """Exchange in a thread, once in a period of the loop; `supervised` sees an error in it."""
+        self._thread = threading.Thread(target=supervised(self._run), name="driver", daemon=True)
         self._thread.start()
 
     def _run(self) -> None:

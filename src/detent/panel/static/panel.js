@@ -15,6 +15,8 @@ const SHAPES = { // of a state: a sign beside the word, so that colour is not al
 const REMEDIES = ["enable", "confirm", "reset", "home", "take", "trust"]; // words that are buttons beside their reason
 const LABELS = { enable: "Enable", confirm: "Confirm: full speed", reset: "Reset", home: "Home", take: "Take command", trust: "I know where it is" };
 
+const OPENS = { h: "home", g: "positions", t: "positions" }; // keys that open a view
+
 const $ = (id) => document.getElementById(id);
 const link = new Link();
 let view = null; // the open one: {status?, close?, key?}
@@ -73,7 +75,8 @@ function showReasons(why, running) {
     const button = word && h("button", { class: "small", onclick: () => act(word, word === "trust" ? 2 : undefined) }, LABELS[word]);
     return h("li", {}, h("span", {}, `${what}: `, h("b", {}, remedy)), button);
   }));
-  $("why-box").hidden = why.length === 0 || (name !== "status" && why.every(([what]) => what.startsWith("nothing")));
+  const isSaidThere = name === "faults" && why.some(([what]) => what.startsWith("fault ")); // and at more length
+  $("why-box").hidden = why.length === 0 || isSaidThere || (name !== "status" && why.every(([what]) => what.startsWith("nothing")));
 }
 
 function showStatus() {
@@ -92,7 +95,8 @@ function showStatus() {
   say($("who"), `${who}, ${clients} ${clients === 1 ? "page or program" : "pages and programs"}`);
   mark($("who"), "warn", holder && holder !== you);
   say($("doing"), status.running ? status.running.command : status.rests ? "at rest" : "moving");
-  say($("limits"), status.limited ? "at the limit of effort" : status.confirmed ? "" : "a tenth of the speed until confirmed");
+  const free = link.about.limits && status.trust === "unknown"; // nobody knows where they are
+  say($("limits"), free ? "limits NOT active: position unknown" : status.limited && level === "good" ? "at the limit of effort" : status.confirmed ? "" : "a tenth of the speed until confirmed");
   showReasons(why, status.running);
   view?.status?.(status, link.now);
   $("updates").value = String(++showStatus.count);
@@ -147,6 +151,7 @@ function onKey(event) {
     event.preventDefault();
     stop();
   } else if (event.key === "?") $("help").showModal();
+  else if (event.key.toLowerCase() in OPENS) location.hash = OPENS[event.key.toLowerCase()]; // a button there asks for the rest
   else if (event.key === "F2") act(link.now?.status.state === "operation enabled" ? "disable" : "enable");
   else view?.key?.(event);
 }

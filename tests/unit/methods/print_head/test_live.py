@@ -1,5 +1,6 @@
 """What the host makes of a job; what the loop does with it is among the acceptance tests."""
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -42,6 +43,23 @@ def test_a_head_takes_jobs_and_no_numbers(axis):
     assert axis.tray.shape == (PIECES, PIECE)
     axis.tray[1, 3] = 7
     assert axis.memory.tray[PIECE + 3] == 7
+
+
+def test_the_line_under_way_is_shown_glyph_by_glyph(axis):
+    work = HeadWork(make_spec(), axis, parse_text("de tent\n\nhead"))
+    shown = work.shown
+    assert (shown["line"], "".join(char for char, *_ in shown["ink"])) == (1, "detent")
+    places, widths = [place for _, place, _ in shown["ink"]], {round(width, 6) for *_, width in shown["ink"]}
+    assert widths == {round(0.0254 / 10, 6)}  # ten characters to an inch
+    gaps = [round((b - a) / 0.00254) for a, b in pairwise(places)]
+    assert gaps == [1, 2, 1, 1, 1]
+    assert shown["direction"] in (-1, 1)
+    work.piece()
+    axis.memory.done = 1
+    assert work.shown["line"] == 2
+    work.piece()
+    axis.memory.done = 2
+    assert work.shown == {}
 
 
 def test_a_piece_is_the_commands_of_a_line_and_its_columns(axis):

@@ -5,13 +5,13 @@ import { quantity } from "../units.js";
 
 const list = (items) => h("ol", {}, items.map((one) => h("li", {}, one)));
 
-function record(one) {
+function record(one, ...more) {
   const kept = one.position === "kept";
   return h("article", { class: "fault" },
     h("h2", {}, h("span", { "aria-hidden": true }, "▲ "), one.text),
     h("p", {}, h("strong", { class: kept ? "good" : "bad" }, kept ? "✓ The position was kept." : "✗ The position was lost: home before a move."), " ",
       one.value !== null && one.value !== undefined ? `It was ${quantity(one.value, one.unit)}${one.limit !== null && one.limit !== undefined ? `, the limit is ${quantity(one.limit, one.unit)}` : ""}.` : "",
-      ` ${one.code}, number ${one.number}.`),
+      ` ${one.code}, number ${one.number}.`), ...more,
     one.causes?.length ? h("div", {}, h("h3", {}, "Likely causes, the likeliest first"), list(one.causes)) : "",
     one.steps?.length ? h("div", {}, h("h3", {}, "What to do"), list(one.steps)) : "",
     one.allowed?.length ? h("p", {}, `Allowed now: ${one.allowed.join(", ")}.`) : "");
@@ -19,6 +19,7 @@ function record(one) {
 
 export function open(root, { link, act, tell }) {
   const now = h("div", { role: "status" });
+  const reset = () => h("p", { class: "line" }, h("button", { onclick: () => act("reset") }, "Reset"), h("small", {}, "Never moves the axis; enabling is a step of its own."));
   const past = h("div", { id: "faults" });
   const injections = Object.entries(link.about.injections ?? {}).flatMap(([where, kinds]) => kinds.map((kind) => `${where} ${kind}`));
   let code = -1;
@@ -27,7 +28,10 @@ export function open(root, { link, act, tell }) {
     if (!link.about.questions.includes("faults")) return;
     try {
       const { faults } = await link.request({ do: "faults" });
-      if (isOpen) fill(past, faults.length ? [...faults].reverse().map(record) : h("p", { class: "hint" }, "No fault since it was started."));
+      if (!isOpen) return;
+      const before = [...faults].reverse();
+      if (code > 0 && before.length) fill(now, record(before.shift(), reset())); // the one that stands, with all that is known of it
+      fill(past, before.length ? before.map((one) => record(one)) : h("p", { class: "hint" }, code > 0 ? "None before it." : "No fault since it was started."));
     } catch (error) {
       tell(`faults: ${error.message}`, "bad");
     }
@@ -48,9 +52,8 @@ export function open(root, { link, act, tell }) {
       const at = s.fault?.code ?? 0;
       if (at === code) return;
       code = at;
-      fill(now, s.fault ? h("div", { class: "note bad" }, h("p", {}, h("span", { "aria-hidden": true }, "▲ "), h("strong", {}, s.fault.text), ` (${s.fault.code})`),
-        h("p", {}, "Mend the cause, then reset. A reset never moves the axis; enabling is a step of its own."),
-        h("button", { onclick: () => act("reset") }, "Reset")) : h("p", {}, h("span", { "aria-hidden": true }, "✓ "), "No fault now."));
+      fill(now, s.fault ? h("div", { class: "note bad" }, h("p", {}, h("span", { "aria-hidden": true }, "▲ "), h("strong", {}, s.fault.text), ` (${s.fault.code})`), reset())
+        : h("p", {}, h("span", { "aria-hidden": true }, "✓ "), "No fault now."));
       load();
     },
     close() { isOpen = false; },

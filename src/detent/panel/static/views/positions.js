@@ -3,6 +3,9 @@
 import { field, fill, h } from "../dom.js";
 import { number, shown, typed } from "../units.js";
 
+/** A moment in the time of whoever looks, to the minute. */
+const moment = (text) => text && new Date(text).toLocaleString("sv-SE").slice(0, 16);
+
 export function open(root, { link, act, tell }) {
   const { unit, commands } = link.about;
   if (!commands.includes("teach")) {
@@ -38,7 +41,7 @@ export function open(root, { link, act, tell }) {
     return h("tr", {}, h("th", { scope: "row" }, one.name), h("td", { class: "line" },
       h("button", { class: "go", onclick: () => act("go_to", one.name), "aria-label": `Go to ${one.name}` }, "Go"),
       h("button", { class: "plain", onclick: () => change("forget", one.name), "aria-label": `Delete ${one.name}` }, "Delete")),
-      h("td", {}, place, ` ${shown(unit).name}`), h("td", {}, one.taught), h("td", {}, one.used || "never"));
+      h("td", {}, place, ` ${shown(unit).name}`), h("td", {}, moment(one.taught)), h("td", {}, moment(one.used) || "never"));
   }
   teach.addEventListener("submit", async (event) => {
     event.preventDefault();

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any, get_args
 
 import detent
-from detent.export.translate.expressions import array_of
-from detent.export.translate.statements import Statements, names_written, targets_of
-from detent.export.translate.values import (
+from detent.kernel.registers import Field, Registers, Width, i8
+from detent.translate.expressions import array_of
+from detent.translate.statements import Statements, names_written, targets_of
+from detent.translate.values import (
     C_WORDS,
     INTEGERS,
     Notes,
@@ -26,7 +27,6 @@ from detent.export.translate.values import (
     type_of_local,
     whole,
 )
-from detent.kernel.registers import Field, Registers, Width, i8
 
 TURNS, EXACT = 60, 24  # turns over the program at most, and of these the ones in which intervals grow as they are
 PACKAGE = Path(detent.__file__).parent
@@ -205,7 +205,7 @@ class Program:
         """The step that is this function of Python."""
         if py not in self.steps:
             taken = {f.cname for f in self.steps.values()}
-            made = cname or f"{self.name}_{py.__name__}"
+            made = cname or self.shape.names.get(py, f"{self.name}_{py.__name__}")
             if made in taken:
                 made = f"{self.name}_{py.__module__.rpartition('.')[2]}_{py.__name__}"
             if made in taken:
@@ -277,7 +277,7 @@ class Program:
 
     def constant(self, name: str, value: float, text: str) -> str:
         """Name in C of a number of a module."""
-        made = f"{self.name.upper()}_{name.lstrip('_').upper()}"
+        made = f"{self.name.upper()}_{self.shape.constants.get(name, name).lstrip('_').upper()}"
         known = self.notes.constants
         while known.get(made, (value,))[0] != value:
             made += "_"

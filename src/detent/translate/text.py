@@ -3,9 +3,9 @@
 import re
 from collections.abc import Iterable
 
-from detent.export.translate.program import Function, Program
-from detent.export.translate.values import c_field
 from detent.kernel.registers import Registers
+from detent.translate.program import Function, Program
+from detent.translate.values import c_field
 
 UNSIGNED = {"i1": "uint8_t", "i2": "uint16_t", "i4": "uint32_t", "i8": "uint64_t"}
 
@@ -61,6 +61,13 @@ WHOLE_HELPERS = {
 {
     const int64_t t = N(to_i64)(x);
     return ((x < (double)t) && (t > INT64_MIN)) ? (t - 1) : t;
+}
+""",
+    "round": """int64_t N(round)(double x)
+{
+    const int64_t below = N(floor)(x);
+    const double rest = x - (double)below;
+    return ((rest > 0.5) || (!(rest < 0.5) && (((uint64_t)below & 1u) != 0u))) ? (below + 1) : below;
 }
 """,
     "power_of_two": """double N(power_of_two)(int64_t exponent)
@@ -142,9 +149,9 @@ def helper_text(name: str, prefix: str, storage: str = "static ") -> str:
 
 def helpers_text(program: Program) -> str:
     """All helpers that a program needs, the ones that others call first."""
-    needed = program.notes.helpers | ({"to_i64"} if "floor" in program.notes.helpers else set[str]())
+    needed = program.notes.helpers
     storage = program.shape.storage or "static "
-    order = sorted(needed, key=lambda one: (one == "floor", one))
+    order = sorted(needed, key=lambda one: (one in ("floor", "round"), one))
     return "\n".join(helper_text(one, program.name, storage) for one in order)
 
 
@@ -218,3 +225,24 @@ def code_text(program: Program) -> str:
     includes += ["<stddef.h>"] if "NULL" in functions else []
     includes += ["<string.h>"] if "memcpy(" in body else []
     return "".join(f"#include {one}\n" for one in includes) + "\n" + body
+
+
+LONGEST = 118
+BREAKS = (" && ", " || ", " ? ", " : ", ", ")
+
+
+def wrapped(code: str) -> str:
+    """The same code in lines that are not too long, broken behind and, or, a comma, and before what a choice gives."""
+    made: list[str] = []
+    for whole_line in code.split("\n"):
+        line, indent = whole_line, " " * (len(whole_line) - len(whole_line.lstrip()) + 8)
+        while len(line) > LONGEST:
+            places = [(line.rfind(one, len(indent) + 1, LONGEST - 2), one) for one in BREAKS]
+            at, one = max(places)
+            if at < 0:
+                break
+            at += 1 if one in (" ? ", " : ") else len(one)
+            made.append(line[:at].rstrip())
+            line = indent + line[at:]
+        made.append(line)
+    return "\n".join(made)

@@ -9,10 +9,10 @@ import pytest
 from tests import firmware_steps
 from tests.firmware_steps import ACCEPTED, REFUSED, Limits, State
 
-from detent.export.translate.program import Program
-from detent.export.translate.text import code_text, signals_text, struct_texts
-from detent.export.translate.values import RefusedError
 from detent.kernel.step import step
+from detent.translate.program import Program
+from detent.translate.text import code_text, signals_text, struct_texts
+from detent.translate.values import RefusedError
 
 
 @pytest.fixture(autouse=True)
@@ -83,7 +83,7 @@ def test_what_is_not_proven_is_told():
 
 def test_functions_stand_behind_those_they_call_with_their_docstrings():
     text = text_of(firmware_steps.effects)
-    assert text.index("static int32_t t_bump(") < text.index("void t_effects(")
+    assert text.index("static int t_bump(") < text.index("void t_effects(")
     assert " * Writes, and gives something.\n" in text
 
 

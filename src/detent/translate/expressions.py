@@ -3,8 +3,9 @@
 import ast
 from dataclasses import replace
 
-from detent.export.translate.integers import Integers
-from detent.export.translate.values import (
+from detent.kernel.registers import Field, Registers
+from detent.translate.integers import Integers
+from detent.translate.values import (
     ANY,
     ATOM,
     INTEGERS,
@@ -32,7 +33,6 @@ from detent.export.translate.values import (
     type_of_local,
     whole,
 )
-from detent.kernel.registers import Field, Registers
 
 SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 REAL_SIGNS: dict[type[ast.operator], tuple[str, int]] = {
@@ -157,6 +157,9 @@ class Expressions(Integers):
 
     def e_Subscript(self, node: ast.Subscript) -> Value:  # noqa: N802
         """An element."""
+        found = self.f.globals.get(node.value.id) if isinstance(node.value, ast.Name) else None
+        if isinstance(found, tuple):
+            return self._of_a_tuple(node, [number(one) for one in found])  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
         array, index = self.expr(node.value), self.expr(node.slice)
         self.check_index(node, array, index)
         text = array.element.format(text=array.text, index=index.text)
@@ -168,6 +171,18 @@ class Expressions(Integers):
         if array.within is not None:
             lo, hi = max(lo, int(array.within[0])), min(hi, int(array.within[1]))
         return whole(text, INTEGERS[array.width.code], lo, hi)
+
+    def _of_a_tuple(self, node: ast.Subscript, items: list[Value]) -> Value:
+        """An element of a tuple of whole numbers of the module."""
+        index = self.expr(node.slice)
+        if not items or any(one.kind != "int" for one in items):
+            raise outside_language(node, f"an element of {ast.unparse(node.value)}", "use a tuple of whole numbers")
+        ends = min(one.lo for one in items), max(one.hi for one in items)
+        element = whole("", "", *ends)
+        name, ctype = self.temporary(), type_of_local(element)
+        self.check_index(node, Value(kind="array", text=name, length=len(items)), index)
+        self.pre.append(f"static const {ctype} {name}[{len(items)}] = {{{', '.join(one.text for one in items)}}};")
+        return whole(f"{name}[{index.text}]", ctype, *ends)
 
     # ---- operators
 
@@ -271,8 +286,6 @@ class Expressions(Integers):
             raise outside_language(node, f"a choice between {a.kind} and {b.kind}", "choose between numbers")
         lo, hi = min(a.lo, b.lo), max(a.hi, b.hi)
         ctype, (a, b) = brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
-        a, b = (replace(c, text=f"({ctype}){in_brackets(c, UNARY)}", level=UNARY)
-                if c.ctype != ctype and not c.literal else c for c in (a, b))  # fmt: skip
         return whole(f"({test.text}) ? {in_brackets(a, SUM)} : {in_brackets(b, SUM)}", ctype, lo, hi, ANY + 1)
 
     # ---- comparisons

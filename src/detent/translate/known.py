@@ -11,10 +11,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from detent.export.translate.values import RefusedError, Value, outside_language
+from detent.translate.values import RefusedError, Value, number, outside_language
 
 if TYPE_CHECKING:
-    from detent.export.translate.program import Function, Program
+    from detent.translate.program import Function, Program
 
 FLIPPED: dict[Any, Any] = {
     ast.Lt: ast.Gt,
@@ -163,9 +163,13 @@ class Known:
             known = self._simple(place)
             if known is None or known.kind != "int":
                 continue
-            if how is ast.Lt and isinstance(limit, ast.Call) and getattr(limit.func, "id", "") == "len":
+            if isinstance(limit, ast.Call) and getattr(limit.func, "id", "") == "len":
                 with suppress(RefusedError):
-                    self.facts.below.add((known.text, self.expr(limit.args[0]).text))
+                    signal = self.expr(limit.args[0])
+                    if signal.length:
+                        self._bind(how, known, number(signal.length))
+                    elif how is ast.Lt:
+                        self.facts.below.add((known.text, signal.text))
             bound = self._simple(limit)
             if bound is not None and bound.kind == "int":
                 self._bind(how, known, bound)

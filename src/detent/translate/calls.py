@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from detent.export.translate.expressions import Expressions
-from detent.export.translate.values import (
+from detent.kernel import compiled
+from detent.translate.expressions import Expressions
+from detent.translate.values import (
     HIGHEST,
     LOWEST,
     RefusedError,
@@ -26,7 +27,6 @@ from detent.export.translate.values import (
     whole,
     widen,
 )
-from detent.kernel import compiled
 
 
 class Calls(Expressions):
@@ -121,6 +121,15 @@ class Calls(Expressions):
         self.helper("to_i64", "")
         return whole(f"{self.helper('floor', '')}({value.text})", "int64_t", LOWEST, HIGHEST)
 
+    def k_round(self, node: ast.Call) -> Value:
+        """Nearest whole number, the even one of two as near."""
+        value = self._one(node)
+        if value.kind != "float":
+            return as_whole(value)
+        for one in ("to_i64", "floor"):
+            self.helper(one, "")
+        return whole(f"{self.helper('round', '')}({value.text})", "int64_t", LOWEST, HIGHEST)
+
     def k_int(self, node: ast.Call) -> Value:
         """Whole number towards zero; outside of 64 bits the nearest there is."""
         value = self._one(node)
@@ -186,6 +195,7 @@ KNOWN: dict[Any, Callable[[Calls, ast.Call], Value]] = {
     math.sqrt: Calls.k_sqrt,
     math.floor: Calls.k_floor,
     builtins.int: Calls.k_int,
+    builtins.round: Calls.k_round,
     builtins.float: Calls.k_float,
     builtins.bool: Calls.k_bool,
     builtins.abs: Calls.k_abs,

@@ -7,8 +7,8 @@ step wraps. Nothing relies on what C leaves to the compiler.
 import ast
 from typing import Any
 
-from detent.export.translate.known import Known
-from detent.export.translate.values import (
+from detent.translate.known import Known
+from detent.translate.values import (
     ANY,
     HIGHEST,
     LOWEST,
@@ -123,7 +123,11 @@ class Integers(Known):
         bits = max(bits_of(a.lo, a.hi), 16 if b.hi < 16 else 32 if b.hi < 32 else 64)
         ctype, (a,) = brought_to(bits, a)
         if a.lo >= 0:
-            text = f"{in_brackets(a, UNARY)} >> {in_brackets(b, UNARY)}"
+            # Without a sign in its way, a shift by a byte or more costs a small processor a copy.
+            first = f"(unsigned){in_brackets(a, UNARY)}" if ctype == "int" and b.lo >= 8 else in_brackets(a, UNARY)
+            text = f"{first} >> {in_brackets(b, UNARY)}"
+            if ctype == "int" and b.lo >= 8:
+                return whole(f"(int)({text})", ctype, min(corners), max(corners), UNARY)
             return whole(text, ctype, min(corners), max(corners), ANY)
         text = f"{self.helper('shift_right', ctype)}({a.text}, {cast(b, 'int32_t').text})"
         return whole(text, ctype, min(corners), max(corners))

@@ -5,9 +5,10 @@ import re
 from dataclasses import replace
 from typing import Any
 
-from detent.export.translate.calls import Calls
-from detent.export.translate.known import Facts
-from detent.export.translate.values import (
+from detent.kernel.registers import Width
+from detent.translate.calls import Calls
+from detent.translate.known import Facts
+from detent.translate.values import (
     ATOM,
     INTEGERS,
     UNARY,
@@ -27,7 +28,6 @@ from detent.export.translate.values import (
     whole,
     widen,
 )
-from detent.kernel.registers import Width
 
 ZERO = {"float": "0.0", "bool": "false", "file": "NULL", "int": "0"}
 
@@ -46,6 +46,13 @@ def names_written(body: list[ast.stmt]) -> set[str]:
     """Variables that a block assigns to."""
     every = (node for one in body for node in ast.walk(one))
     return {t.id for node in every for t in targets_of(node) if isinstance(t, ast.Name)}
+
+
+def places_in(node: ast.AST) -> set[str]:
+    """Variables and, by the last part of their names, registers that stand in an expression."""
+    every = list(ast.walk(node))
+    registers = {f".{one.attr}" for one in every if isinstance(one, ast.Attribute)}
+    return registers | {one.id for one in every if isinstance(one, ast.Name)}
 
 
 def leaves_off(body: list[ast.stmt]) -> bool:
@@ -296,8 +303,9 @@ class Statements(Calls):
         if len(node.targets) > 1 or not isinstance(node.value, ast.Tuple) or len(target.elts) != len(node.value.elts):
             raise outside_language(node, "a tuple on one side only", "write as many values as names")
         values = self.ordered(node.value.elts)
-        left = {ast.unparse(one).rpartition(".")[2] for one in target.elts}
-        right = {ast.unparse(one).rpartition(".")[2] for one in ast.walk(node.value) if isinstance(one, ast.expr)}
+        written = [one.value if isinstance(one, ast.Subscript) else one for one in target.elts]
+        left = {f".{one.attr}" if isinstance(one, ast.Attribute) else ast.unparse(one) for one in written}
+        right = places_in(node.value)
         calls = any(isinstance(one, ast.Call) for one in ast.walk(node.value))
         if left & right or (calls and len(values) > 1):
             values = [self.keep(one) for one in values]
@@ -405,6 +413,8 @@ class Statements(Calls):
         if claimed is not None and not claimed[0] <= value.lo <= value.hi <= claimed[1]:
             if self.final:
                 self.program.notes.claims.add((self.f.where(node), f"the range of {ast.unparse(node)}"))
+            if not self.program.shape.checks:
+                return value.text if value.ctype == ctype else f"({ctype}){in_brackets(value, UNARY)}"
             text = f"{self.helper('claimed', '')}({value.text}, {number(int(claimed[0])).text}, "
             return f"({ctype}){text}{number(int(claimed[1])).text})"
         if value.ctype == ctype or (value.literal and lo <= value.lo <= hi):

@@ -2,7 +2,7 @@
 
 import ast
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -274,7 +274,12 @@ class Shape:
         default_factory=dict[Any, Any]
     )
     """Registers that are as wide, and hold as much, as this axis needs."""
+    names: Mapping[Callable[..., Any], str] = field(default_factory=dict[Any, str])
+    """Names in C of steps that are not those of the steps."""
+    constants: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Names in C of numbers of a module that are not those of the numbers."""
     storage: str = ""  # of every function, where it is not that of an entry
+    checks: bool = True  # claims can be checked by a build with FIRMWARE_CHECK
 
 
 @dataclass

@@ -1,0 +1,234 @@
+"""What is made of logs with faults: clean logs, simulated and recorded, and each spoilt in each way."""
+
+import csv
+import math
+import multiprocessing
+import os
+import zlib
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from detent.errors import InputError
+from detent.identify.fit.identification import Identification, identify
+from detent.logs.read_log import read_log
+from tests.places import DATA
+from tests.trust.faults import FAULTS, Table
+from tests.trust.plants import make_case
+from tests.trust.table import table
+
+SIMULATED = (7001, 7005)
+"""Numbers of cases that faults are put into."""
+
+SERVO = ("time=timestamp", "position=position [rad]", "reference=goal_position [rad]", "velocity=", "command=load")
+
+
+@dataclass(frozen=True)
+class Clean:
+    """A log without faults: its table, its headings."""
+
+    table: Table
+    headings: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a spoilt log.
+
+    Attributes
+    ----------
+    log, fault : str
+    verdict : str
+    said : tuple of str
+        What was refused, or noted of the file.
+    disjoint, outside : tuple of str
+        Trusted constants whose interval shares nothing with that of the clean log; whose value lies outside of it.
+    """
+
+    log: str
+    fault: str
+    verdict: str
+    said: tuple[str, ...] = ()
+    disjoint: tuple[str, ...] = ()
+    outside: tuple[str, ...] = ()
+
+    @property
+    def is_refused(self) -> bool:
+        return self.verdict in {"refused", "unreadable"}
+
+
+def simulated(number: int) -> Clean:
+    found = make_case(number).columns
+    table = dict(zip(("time", "reference", "position", "effort"), (v.copy() for v in found.values()), strict=True))
+    return Clean(table, {"reference": "position ref [m]", "position": "position [m]", "effort": "force [N]"})
+
+
+def recorded(path: str, columns: Sequence[str]) -> Clean:
+    """The signals of a recording of a machine."""
+    log = read_log(DATA / path, None, columns)
+    effort = log.effort()
+    unit = log.units["position"]
+    table = {"time": log.t, "position": log.signals["position"], "effort": log.signals[effort]}
+    headings = {"position": f"position [{unit}]", "effort": f"{effort} [{log.units[effort]}]"}
+    if "reference" in log.signals:
+        table["reference"] = log.signals["reference"]
+        headings["reference"] = f"position ref [{unit}]"
+    return Clean(table, {k: v.removesuffix(" []") for k, v in headings.items()})
+
+
+def _sources() -> dict[str, Callable[[], Clean]]:
+    def simulate(number: int) -> Callable[[], Clean]:
+        return lambda: simulated(number)
+
+    def record(path: str, columns: Sequence[str]) -> Callable[[], Clean]:
+        return lambda: recorded(path, columns)
+
+    found = {f"simulated {number}": simulate(number) for number in SIMULATED}
+    if DATA.exists():
+        screw = ("position=qm [m]", "reference=qg [m]", "force=vir [35.15 N]")
+        motor = ("command=-inputSignal",)
+        servos = "servo_pendulum_bam/xl330/2026-01-15_10h"
+        found |= {
+            "ball screw": record("emps/DATA_EMPS.mat", screw),
+            "small motor": record("arduino_dc_motor/exp1.csv", motor),
+            "servo 2": record(f"{servos}29m04.json.gz", SERVO[1:4]),
+        }
+    return found
+
+
+SOURCES = _sources()
+
+
+@cache
+def clean(name: str) -> Clean:
+    return SOURCES[name]()
+
+
+def write(made: Clean, table: Table, path: Path) -> None:
+    """Write a table as a log."""
+    unit = made.headings["position"].partition("[")[2].rstrip("]")
+    headings = {"time": "t [s]", "velocity": f"velocity [{unit}/s]"} | made.headings
+    names = [name for name in ("time", "reference", "position", "velocity", "effort") if name in table]
+    rows = zip(*(np.round(table[name], 12).tolist() for name in names), strict=True)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow([headings[name] for name in names])
+        writer.writerows([["" if math.isnan(v) else v for v in row] for row in rows])
+
+
+def found_in(made: Clean, table: Table) -> Identification | str:
+    """The identification of a table by the way of its file, or why there is none."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        write(made, table, path)
+        try:
+            return identify([read_log(path)])
+        except InputError as error:
+            return str(error)
+
+
+@cache
+def truth(name: str) -> Identification:
+    """What the clean log says."""
+    made = clean(name)
+    found = found_in(made, made.table)
+    assert not isinstance(found, str), found
+    return found
+
+
+def judge_fault(asked: tuple[str, int]) -> Outcome:
+    """Identify a log with a fault, and compare its trusted constants with those of the clean log."""
+    log, number = asked
+    fault, made = FAULTS[number], clean(log)
+    rng = np.random.default_rng(zlib.crc32(f"{log} {fault.name}".encode()))
+    found = found_in(made, fault.spoil({k: v.copy() for k, v in made.table.items()}, rng))
+    if isinstance(found, str):
+        return Outcome(log, fault.name, "unreadable", (found[:160],))
+    known = {e.name: e for e in truth(log).trusted}
+    both = [(e, known[e.name]) for e in found.trusted if e.name in known]
+    said = [str(r)[:160] for r in found.refusals] + [str(f)[:160] for log in found.logs for f in log.findings]
+    return Outcome(
+        log,
+        fault.name,
+        found.verdict,
+        tuple(said),
+        tuple(e.name for e, c in both if e.low > c.high or e.high < c.low),
+        tuple(e.name for e, c in both if not c.holds(e.value)),
+    )
+
+
+def judge_faults(numbers: Sequence[int], logs: Sequence[str] = (), workers: int | None = None) -> list[Outcome]:
+    """Judge every log with every one of some faults."""
+    asked = [(log, k) for log in logs or SOURCES for k in numbers if (FAULTS[k].needs or "time") in clean(log).table]
+    if workers == 1:
+        return [judge_fault(one) for one in asked]
+    os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    with ProcessPoolExecutor(workers or os.cpu_count(), multiprocessing.get_context("spawn")) as pool:
+        return list(pool.map(judge_fault, asked, chunksize=max(len(numbers) // 2, 1)))
+
+
+# ---- the page
+
+
+HEAD = """# Faults of recordings: what is made of each kind
+
+This page is written by `python -m tests.trust.wild`, run from the root of the project; do not edit it.
+
+{kinds} kinds of faults ([tests/trust/faults.py](../../tests/trust/faults.py)) are put into {logs}. Each spoilt log goes
+the way of a user's log, and what is trusted of it is compared with what the clean log gives. *Right*: something was
+trusted, and every trusted interval meets that of the clean log. *Wrong*: one of them does not. *Outside*: a trusted
+value lies outside the clean interval, which chance alone does to some where a fault takes rows away. Rules were chosen
+with the kinds of the first table at hand, and not with those of the second.
+"""
+
+
+def page(outcomes: Sequence[Outcome]) -> str:
+    """The page of the documentation."""
+    logs = list(dict.fromkeys(o.log for o in outcomes))
+    kinds = len({o.fault for o in outcomes})
+    text = HEAD.format(kinds=kinds, logs=f"{', '.join(logs[:-1])} and {logs[-1]}")
+    for title, first in (("Kinds that rules were chosen with", 0), ("Kinds that they were not chosen with", 1)):
+        names = [fault.name for fault in FAULTS[first::2]]
+        text += f"\n## {title}\n\n{fault_table([o for o in outcomes if o.fault in names])}"
+    return text
+
+
+def fault_table(outcomes: Sequence[Outcome]) -> str:
+    """A row per kind, and one for all."""
+    rows = [
+        [name, *_counts([o for o in outcomes if o.fault == name])] for name in dict.fromkeys(o.fault for o in outcomes)
+    ]
+    return table(
+        ("fault", "logs", "right", "wrong", "refused", "outside"),
+        [*rows, ["all", *_counts(outcomes)], ["share", "", *_shares(outcomes)]],
+    )
+
+
+def _numbers(outcomes: Sequence[Outcome]) -> tuple[int, int, int, int]:
+    wrong, refused = sum(bool(o.disjoint) for o in outcomes), sum(o.is_refused for o in outcomes)
+    return len(outcomes) - wrong - refused, wrong, refused, sum(bool(o.outside) for o in outcomes)
+
+
+def _counts(outcomes: Sequence[Outcome]) -> list[str]:
+    return [str(len(outcomes)), *map(str, _numbers(outcomes))]
+
+
+def _shares(outcomes: Sequence[Outcome]) -> list[str]:
+    return [f"{100 * number / max(len(outcomes), 1):.1f} %" for number in _numbers(outcomes)]
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "fault-table.md"
+
+
+def main() -> None:
+    """Judge all logs with all faults, and write the page."""
+    PAGE.write_text(page(judge_faults(range(len(FAULTS)))), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
