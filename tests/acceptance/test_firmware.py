@@ -518,7 +518,7 @@ BARS_28 = {
 }  # instructions of the longest tick
 """The specification counts a call, these are ticks. One of the cascade is a sample. One of the phase servo is its call
 (330 and 700), and in the tick of a strobe, when its guard looks, which came later, 424 were counted on a Cortex-M4, 308
-elsewhere. One of the filtered servo has ten clocks and what comes before them (2,839 and 6,855 in the prototype), of the
+elsewhere. One of the filtered servo has ten clocks and what comes before them (2,839 and 6,855 in the prototype), of a
 stepper a pause of no length and the step behind it, of the rotary table an interrupt (2,500), composition and guard,
 of the print head an emitter, a column and a decision."""
 CORTEX = ("cortex-m4", "cortex-m0")
