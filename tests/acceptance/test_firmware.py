@@ -489,7 +489,6 @@ BARS_27 = {
     "print_head": 4700,
 }  # of memory [byte]
 DEEPEST_27 = {"print_head": 450}  # bytes of stack; of the others 260
-DIVIDES = {"zoom": (), "print_head": ("__aeabi_ldivmod",)}  # routines of the library that these two need
 LATER = {"guard", "supervision", "watched", "look", "marks", "mark", "stop_at"}
 """What the figures of the specification do not count: protection, homing by an index, a stop to look at on the way."""
 BARS_26 = {
@@ -511,16 +510,17 @@ WHOLE_26 = {
 """The same of what is exported today, with protection, homing, a hanging load, dead bands, noise on lines."""
 BARS_28 = {
     "cascade": (6500, 16000),
-    "phase_servo": (330, 700),
+    "phase_servo": (450, 950),
     "filtered_servo": (2839 + 10 * 430, 6855 + 10 * 1250),
     "zoom": (2 * 150, 2 * 200),
     "rotary_table": (2700, 6700),
     "print_head": (750 + 700 + 300, 1800 + 1600 + 500),
 }  # instructions of the longest tick
-"""The specification counts a call; a tick of today has one of the cascade and of the phase servo, ten clocks and what
-comes before them of the filtered servo (2,839 and 6,855 in the prototype), a pause of no length and the step behind it
-of the stepper, an interrupt (2,500) and composition and guard around it of the rotary table, and of the print head an
-emitter, a column and a decision."""
+"""The specification counts a call, these are ticks. One of the cascade is a sample. One of the phase servo is its call
+(330 and 700), and in the tick of a strobe, when its guard looks, which came later, 424 were counted on a Cortex-M4, 308
+elsewhere. One of the filtered servo has ten clocks and what comes before them (2,839 and 6,855 in the prototype), of a
+stepper a pause of no length and the step behind it, of the rotary table an interrupt (2,500), composition and guard,
+of the print head an emitter, a column and a decision."""
 CORTEX = ("cortex-m4", "cortex-m0")
 
 
@@ -606,10 +606,10 @@ def test_27_memory_and_stack_on_cortex(counted, method):
     control = next(e for e in found["cortex-m4"].entries if e.name == f"{manifest['name']}_control")
     assert 40 <= control.painted <= DEEPEST_27.get(method, 260)
     library = found["cortex-m4"].sizes["-Os"].library
-    if method in DIVIDES:
-        assert library == DIVIDES[method]
+    if method in ("zoom", "phase_servo", "print_head"):  # whole numbers alone: a division of 64 bits at most
+        assert set(library) <= {"__aeabi_ldivmod", "__udivmoddi4", "__aeabi_idiv0"}
     else:
-        assert "memcpy" in library
+        assert {"memcpy", "__aeabi_dmul"} <= set(library)
 
 
 def test_22_three_axes_in_one_program_keep_to_themselves(exported, tmp_path):

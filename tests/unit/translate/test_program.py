@@ -73,8 +73,11 @@ def test_what_is_not_proven_is_told():
     notes = program_of(firmware_steps.arithmetic).notes
     assert any("may go beyond 64 bits" in text for _, text in notes.wraps)
     assert any("a store that may wrap: r.half" in text for _, text in notes.wraps)
+    first, turns = firmware_steps.loops.__code__.co_firstlineno, len(firmware_steps.WEIGHTS)
     assert program_of(firmware_steps.loops).notes.loops == {
-        (f"firmware_steps.py:{firmware_steps.halve.__code__.co_firstlineno + 3}", "at most 64 turns: halves 64 bits")
+        (f"firmware_steps.py:{firmware_steps.halve.__code__.co_firstlineno + 3}", "at most 64 turns: halves 64 bits"),
+        (f"firmware_steps.py:{first + 2}", "at most 8 turns: range(PLACES)"),
+        (f"firmware_steps.py:{first + 4}", f"{turns} turns: WEIGHTS"),
     }
 
 
