@@ -202,7 +202,9 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
         if told:
             return Proof(target.name, level, equal=False, told=f"does not compile: {told}")
         entries = [row.split(",")[0] for row in (source / "trace.csv").read_text(encoding="utf-8").splitlines()[1:]]
-        sizes = sizes_of(target.compiler.removesuffix("gcc") if target.emulator else "", work, entries)
+        sizes = sizes_of(
+            (target.linker or target.compiler).removesuffix("gcc") if target.emulator else "", work, entries
+        )
         drawn = _answer(target, work, source, "drawn").splitlines() if target.share else ["drawn equal 0"]
         job = _answer(target, work, source, "job").splitlines()
     told = [told_of_drawn(folder, manifest, drawn)] if not any(one.startswith("drawn equal ") for one in drawn) else []
@@ -215,7 +217,8 @@ def _linking(work: Path, target: Target, level: str, program: str, objects: Sequ
     if target.memory is not None:
         (work / "board.ld").write_text(template("board.ld.in", **target.memory), encoding="utf-8")
         more = ["-T", "board.ld", "-Wl,-e," + ("entry_" if target.name == "rv32" else "Start")]
-    command = [target.linker or target.compiler, *level.split(), *target.flags.split(), *more]
+    compiled_for = [] if target.linker else target.flags.split()
+    command = [target.linker or target.compiler, *level.split(), *compiled_for, *more]
     return [*command, *objects, "-o", program, *target.libraries.split()]
 
 
