@@ -638,6 +638,58 @@ def test_22_three_axes_in_one_program_keep_to_themselves(exported, tmp_path):
     assert done.returncode == 0
 
 
+PAIR = """#include <stdio.h>
+#include "NAME.h"
+typedef struct { NAME_controller c; NAME_lines l; uint64_t h; uint32_t seed; } one_t;
+static uint32_t draw(uint32_t *seed) { *seed = *seed * 1664525u + 1013904223u; return *seed >> 16; }
+static void begin(one_t *x, uint32_t seed)
+{
+    const one_t none = {0};
+    *x = none;
+    x->h = NAME_HASH_START;
+    x->seed = seed;
+}
+static void tick(one_t *x)
+{
+    NAME_lines *l = &x->l;
+WRITES    NAME_control(&NAME_defaults, &x->c, &x->l);
+    x->h = NAME_image_hash(&x->c, &x->l, x->h);
+}
+int main(void)
+{
+    one_t a, b, alone;
+    uint32_t order = 7, turns[2] = {0, 0};
+    begin(&a, 1);
+    begin(&b, 2);
+    while (turns[0] < 3000 || turns[1] < 3000) {
+        const uint32_t which = draw(&order) & 1u;
+        if (turns[which] < 3000) { tick(which ? &b : &a); turns[which]++; }
+    }
+    for (uint32_t which = 0; which < 2; which++) {
+        begin(&alone, which + 1);
+        for (int k = 0; k < 3000; k++) { tick(&alone); }
+        printf("%llx %llx\\n", (unsigned long long)alone.h, (unsigned long long)(which ? b.h : a.h));
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("method", ["phase_servo", "rotary_table"])
+def test_22_two_instances_of_one_unit_do_not_know_of_each_other(exported, tmp_path, method):
+    place, name = copied(exported(method), tmp_path / "out")
+    wires = [row for row in rows(place / "registers.csv") if row["written_by"] == "plant" and row["length"] == "0"]
+    assert wires
+    writes = "".join(f"    {row['expression']} = draw(&x->seed) & 1u;\n" for row in wires)
+    text = PAIR.replace("NAME_HASH_START", f"{name.upper()}_HASH_START").replace("NAME", name)
+    (place / "pair.c").write_text(text.replace("WRITES", writes))
+    made = run(f"gcc {FLAGS} -O1 pair.c", place, *unit_sources(place, name), f"{name}_image.c", "-o", "pair", "-lm")
+    assert made.returncode == 0, made.stderr
+    (first, interleaved), (second, other) = (line.split() for line in run("./pair", place).stdout.splitlines())
+    assert (first, second) == (interleaved, other)
+    assert first != second
+
+
 def rows(file: Path) -> list[dict[str, str]]:
     with file.open(newline="", encoding="utf-8") as stream:
         return list(csv.DictReader(stream))

@@ -221,7 +221,8 @@ def link(work: Path, target: Target, level: str, program: str, parts: Sequence[s
         more = ["-T", "board.ld", "-Wl,-e," + ("entry_" if target.name == "rv32" else "Start")]
     tables = ["tables"] if (work / "tables.o").is_file() else []
     objects = [f"{part}.o" for part in (*parts, *tables, "params", "image")]
-    command = [target.linker or target.compiler, *level.split(), *target.flags.split(), *more]
+    compiled_for = [] if target.linker else target.flags.split()
+    command = [target.linker or target.compiler, *level.split(), *compiled_for, *more]
     return run_tool([*command, *objects, "-o", program, *target.libraries.split()], work)
 
 

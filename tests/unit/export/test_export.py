@@ -164,7 +164,7 @@ def test_what_a_host_does_is_a_call_and_nothing_else(axis):
     fresh = CascadeHost(axis.spec, golden)
     assert int(fresh.act(take_event)) == 0
     fresh.controller.known = 0
-    with pytest.raises(DetentError, match=r"c\.known, written by a host"):
+    with pytest.raises(DetentError, match=r"c\.known is written by a host"):
         fresh.pass_samples(1)
     fresh.controller.known = 1
     with pytest.raises(DetentError, match=r"guard_axis: got 256; expected: numbers in the widths"):
