@@ -159,7 +159,7 @@ def verify(
         for text in other:
             say(text, wrong=True)
         for name, tools in left_out.items():
-            tell(f"{name:<11} not run: {tools}")
+            tell(f"{name:<11} not run: {'' if tools.startswith('FW') else 'needs '}{tools}")
         if not proofs:
             say("nothing was run: no compiler is installed", wrong=True)
     if not done:
