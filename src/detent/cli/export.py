@@ -224,6 +224,6 @@ class _Found:
         for text in self.differences:
             say(text, wrong=True)
         for name, tools in self.left_out.items():
-            tell(f"{name:<11} not run: needs {tools}")
+            tell(f"{name:<11} not run: {'' if tools.startswith('FW') else 'needs '}{tools}")
         if not self.proofs:
             say("nothing was run: no compiler is installed", wrong=True)

@@ -146,10 +146,15 @@ def verify(
     for k, (target, level) in enumerate(runs):
         progress(k / len(runs), f"{target.name} {level.split()[0]}")
         if target.name in out:
-            found.append(Proof(target.name, level, equal=False, told=out[target.name]))
+            found.append(Proof(target.name, level, equal=False, told=_absent(out[target.name])))
         else:
             found.append(_replayed(place, manifest, target, level))
     return found
+
+
+def _absent(why: str) -> str:
+    """What a proof says that could not be tried: a refusal as it is, or the tools that are missing."""
+    return why if why.startswith("FW") else f"not installed: {why}"
 
 
 def left_out(folder: str | Path) -> dict[str, str]:
@@ -163,7 +168,7 @@ def left_out(folder: str | Path) -> dict[str, str]:
         except RefusedError as refused:
             found[name] = str(refused)
         if target.missing:
-            found.setdefault(name, f"not installed: {target.missing}")
+            found.setdefault(name, target.missing)
     return found
 
 
