@@ -6,7 +6,7 @@ import pytest
 from tests.unit.test_cli import call
 
 import detent
-from detent.export import teeth
+from detent.export import measure, teeth
 from detent.export import verify as proving
 from detent.methods.stepper_envelope.method import StepperEnvelopeMethod
 
@@ -54,14 +54,15 @@ def test_refusals_have_status_1_and_a_wrong_folder_2(monkeypatch):
 def test_verify_tells_each_target_and_what_is_not_installed(monkeypatch):
     export()
     gone = proving.Target("gone", "no-such-gcc", "gcc-gone")
-    monkeypatch.setattr(proving, "TARGETS", {"gone": gone})
+    for module in (proving, measure):
+        monkeypatch.setattr(module, "TARGETS", {"gone": gone})
     answer = call("verify", "out")
     assert answer.status == 1
     assert "gone        not run: needs no-such-gcc (Debian: apt install gcc-gone)" in answer.out
     assert call("verify", "out", "--on", "gone").status == 1
     data = call("verify", "out", "--json").data
     nothing = {"equal": False, "proofs": [], "differences": [], "not run": {"gone": gone.missing}}
-    assert data == nothing | {"reach": None, "mutants": []}
+    assert data == nothing | {"measured": {}, "reach": None, "mutants": []}
 
 
 @pytest.mark.process
@@ -69,7 +70,7 @@ def test_verify_replays_here_and_compares_with_the_axis():
     export()
     same = call("verify", "out", "--on", "host-gcc", "--against", CASCADE)
     assert same.status == 0, same.out + same.err
-    assert "bytes of flash" in same.out
+    assert "host-gcc    -Os  equal, hash " in same.out
     other = call("verify", "out", "--on", "host-gcc", "--against", CASCADE, "--set", "method.position_gain=41")
     assert other.status == 1
     assert "cascade_axis_params.c is another file" in other.out + other.err
