@@ -826,7 +826,7 @@ def test_18_a_step_edited_after_the_export_is_named(tmp_path):
 def test_31_a_set_exchanged_at_tick_10000_is_simulated_and_replayed_equal(tmp_path):
     needs("host-gcc")
     axis = detent.load(detent.example("cascade.toml"))
-    rows_of = '[[move]]\nby = "20 mm"\ndwell = "{dwell}"\n'
+    rows_of = '[[move]]\nby = "300 mm"\ndwell = "{dwell}"\n'
     change = '[[parameter_change]]\ntime = "{time!r} s"\nname = "{name}"\nvalue = {value}\n'
     (tmp_path / "same.toml").write_text(rows_of.format(dwell="2 s"))
     at = 10_000 * axis.simulated.tick

@@ -280,7 +280,16 @@ class CountingIndex(int):
         return self + -other
 
 
-STEPS_OF_THE_RULE = ("next_entry", "take_inputs", "wanted_index", "follow", "slower", "come_to_rest", "next_step")
+STEPS_OF_THE_RULE = (
+    "next_entry",
+    "take_inputs",
+    "wanted_index",
+    "follow",
+    "slower",
+    "compare_words",
+    "come_to_rest",
+    "next_step",
+)
 
 
 def plain(function):

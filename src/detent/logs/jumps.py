@@ -146,10 +146,11 @@ def _mend_effort(draft: Draft, role: str) -> None:
 
 
 def _beyond(values: Values) -> Mask:
-    """Short stretches that lie beyond all that is usual by far."""
+    """Short stretches that lie beyond all that is usual by far, and as far from the rows around: no top of a course."""
     low, high = (float(q) for q in np.quantile(values, (0.01, 0.99)))
     reach = BEYOND * (high - low)
-    return _short((values < low - reach) | (values > high + reach), SHORT)
+    found = _short((values < low - reach) | (values > high + reach), SHORT)
+    return found & (np.abs(values - _bridged(values, found)) > reach)
 
 
 def _dropped(values: Values) -> Mask:
