@@ -79,7 +79,6 @@ def test_spikes_of_an_effort_and_rows_of_nothing():
     assert np.abs(made.values["force"] - clean).max() < 0.1
 
 
-@pytest.mark.parametrize("copy", [motion(), 0.1 * np.sin(2 * np.pi * 0.7 * T)])
 def test_the_top_of_an_effort_that_rises_and_falls_was_taken_for_a_spike():
     force = 5.0 * np.sin(2 * np.pi * 0.7 * T)
     force[:7] = [-0.5, 1.5, 9.6, 16.4, 17.2, 11.9, 6.4]
@@ -92,6 +91,7 @@ def test_the_top_of_an_effort_that_rises_and_falls_was_taken_for_a_spike():
     assert [(one.kind, one.rows) for one in made.findings] == [(Kind.SPIKES, ((2001, 2001),))]
 
 
+@pytest.mark.parametrize("copy", [motion(), 0.1 * np.sin(2 * np.pi * 0.7 * T)])
 def test_a_reference_that_is_the_position(copy):
     made = draft(motion(), reference=copy)
     find_copies(made)
