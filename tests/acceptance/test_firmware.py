@@ -296,7 +296,7 @@ def test_21_nothing_is_written_and_little_is_taken_from_a_library(exported, tmp_
     assert here <= {"memcpy", "memset", "sqrt", "__stack_chk_fail", "_GLOBAL_OFFSET_TABLE_"}
     there = needed_by(place, name, "arm-none-eabi-", PROCESSORS["cortex-m4"])
     floats = "f8" in {row["width"] for table in ("params.csv", "registers.csv") for row in rows(place / table)}
-    assert floats == (method not in ON_AVR)
+    assert floats == (method not in (*ON_AVR, "print_head"))
     allowed = {"memcpy", "memset", "sqrt"} if floats else set()
     assert {one for one in there - DIVISION - allowed if not (floats and DOUBLES.fullmatch(one))} == set()
 
@@ -609,7 +609,7 @@ def test_27_memory_and_stack_on_cortex(counted, method):
     if method in ("zoom", "phase_servo", "print_head"):  # whole numbers alone: a division of 64 bits at most
         assert set(library) <= {"__aeabi_ldivmod", "__udivmoddi4", "__aeabi_idiv0"}
     else:
-        assert {"memcpy", "__aeabi_dmul"} <= set(library)
+        assert "__aeabi_dmul" in library
 
 
 def test_22_three_axes_in_one_program_keep_to_themselves(exported, tmp_path):

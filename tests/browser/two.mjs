@@ -25,6 +25,7 @@ found.viewerMoves = await viewer.evaluate(() => window.panel.link.command("move_
 const { epoch } = await status(viewer);
 await viewer.locator("button.stop").click();
 await until(viewer, (s) => s.epoch > epoch && s.rests);
+await until(one, (s) => s.epoch > epoch && !s.running); // the stop itself is done after its time in the window
 found.stoppedByViewer = (await status(one)).running;
 await one.mouse.up();
 await hold();
