@@ -298,6 +298,8 @@ def test_21_nothing_is_written_and_little_is_taken_from_a_library(exported, tmp_
     floats = "f8" in {row["width"] for table in ("params.csv", "registers.csv") for row in rows(place / table)}
     assert floats == (method not in (*ON_AVR, "print_head"))
     allowed = {"memcpy", "memset", "sqrt"} if floats else set()
+    if method == "print_head":  # what the host does with its line buffer is later than the figures: gcc clears with it
+        allowed = {"memset"}
     assert {one for one in there - DIVISION - allowed if not (floats and DOUBLES.fullmatch(one))} == set()
 
 
