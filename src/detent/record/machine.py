@@ -102,10 +102,12 @@ class Machine(Generic[P, S]):
 
     def _to_change(self) -> int:
         """Make the changes of parameters that are due; ticks until the next one."""
+        due = 0
         while self.changes and self.changes[0][0] <= self._clock.tick:
             self.changes.pop(0)[1](self.params)
-            if self.recorder is not None and not isinstance(self.recorder, Recorder | Capture):
-                self.recorder.exchange(self.params)
+            due += 1
+        if due and self.recorder is not None and not isinstance(self.recorder, Recorder | Capture):
+            self.recorder.exchange(self.params)
         return self.changes[0][0] - self._clock.tick if self.changes else LONGEST_STRETCH
 
     def _run(self, ticks: int) -> int:
