@@ -16,6 +16,7 @@ export function open(root, { link, tell }) {
   const hold = h("button", { id: "job-pause", class: "plain", disabled: true }, "Pause");
   const what = prints ? "line" : "move";
   let now = null; // the job that is under way, as the axis tells it
+  let over = false; // its end has been told: a status from before it says nothing new
 
   async function names() {
     if (!commands.includes("teach")) return [];
@@ -33,9 +34,11 @@ export function open(root, { link, tell }) {
   run.addEventListener("click", async () => {
     if (!places.value.trim()) return tell(prints ? "There is nothing to print: write a text." : "The job has no line: write a place on each.", "warn");
     run.disabled = true;
+    over = false;
     try {
       const { ended } = await link.command("job", await job(), prints ? undefined : Number(speed.value) / 100);
       const how = await ended;
+      over = true;
       const why = [how.reason, how.remedy].filter(Boolean).join("; ");
       say(result, how.how === "done" ? `Job done: all of its ${what}s.` : `Job ${how.how}: ${why}.`);
       if (how.how === "done") progress.value = 1;
@@ -58,7 +61,8 @@ export function open(root, { link, tell }) {
       [run.disabled, hold.disabled] = [Boolean(now), !now];
       say(hold, now?.paused ? "Resume" : "Pause");
       mark(hold, "plain", !now?.paused);
-      if (!now) return;
+      if (!now) over = false;
+      if (!now || over) return;
       progress.value = now.of ? now.done / now.of : 0;
       say(result, `${now.name}: ${now.done} of ${now.of} ${what}s done${now.paused ? ", held by a pause" : ""}.`);
     },
