@@ -2717,10 +2717,7 @@ def test_41_a_killed_panel_stops_the_jog_and_comes_back(folder: Path) -> None:
 @pytest.mark.wide
 @pytest.mark.process
 def test_52_stop_is_quick_while_another_client_floods(folder: Path) -> None:
-    """A thousand malformed frames, then ten thousand commands a second: beside each, stops of another page.
-
-    The best of three: where others work on the machine, a flood arrives in heaps.
-    """
+    """A thousand malformed frames, then ten thousand commands a second: beside each, stops of another page."""
     live = live_processes.Live(folder / "slide.toml", "--period", "10 ms", "--json")
     browser = live_processes.entered(json.loads(live.out.readline())["panel"][0])
     cookies = json.dumps(dict(browser.http.cookies))
@@ -2733,11 +2730,9 @@ def test_52_stop_is_quick_while_another_client_floods(folder: Path) -> None:
             one.kill()
             one.wait()
         for kind in ("malformed", "commands"):
-            found: list[live_processes.Stops] = []
-            while not found or (len(found) < 3 and found[-1].computed >= 0.05):
-                found.append(live_processes.flooded(browser, cookies, kind, socket, watcher, pids))
-            assert found[-1].computed < 0.05, (alone, found)
-            assert found[-1].late <= 1.5 * alone.late + 0.02, (alone, found)
+            beside = live_processes.flooded(browser, cookies, kind, socket, watcher, pids)
+            assert beside.computed < 0.05, (alone, beside)
+            assert beside.late <= 1.5 * alone.late + 0.02, (alone, beside)
             assert "status" in socket.ask(do="status")
     browser.http.close()
     live.end()
