@@ -386,7 +386,8 @@ class Connection:
         with self._lock:
             self._marks += 1
             try:
-                self._socket.sendall(json.dumps(message | {"as": self._marks}).encode() + b"\n")
+                with suppress(BrokenPipeError):  # who has closed may have said why, which is read below
+                    self._socket.sendall(json.dumps(message | {"as": self._marks}).encode() + b"\n")
                 while (answer := self._read()).get("as") != self._marks:
                     if "error" in answer:
                         raise AxisError(answer["error"])

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from tests.live_bench import Bench
 
 from detent.control import operation as ops
-from detent.errors import DetentError
+from detent.errors import AxisError, DetentError
 from detent.operate import channel as module
 from detent.operate.audit import Audit
 from detent.operate.channel import QUESTIONS, Channel, Client
@@ -189,3 +189,20 @@ def test_a_stop_overtakes_what_its_own_client_has_waiting_for_a_disk(
         assert (ended.how, ended.code) == ("refused", ops.STALE)
         assert bench.host.state == "switch on disabled"
     channel.close()
+
+
+@pytest.mark.parametrize(("told", "match"), [(b'{"error": "32 clients"}\n', "32 clients"), (b"", "has gone")])
+def test_a_client_reads_why_it_was_refused_though_its_message_meets_a_closed_door(
+    tmp_path: Path, told: bytes, match: str
+) -> None:
+    """Who had been refused before it had asked was told of a broken pipe."""
+    with socket.socket(socket.AF_UNIX) as door:
+        door.bind(str(tmp_path / "door.sock"))
+        door.listen()
+        client = module.Connection(tmp_path / "door.sock")
+        behind, _ = door.accept()
+        behind.sendall(told)
+        behind.close()
+        with pytest.raises(AxisError, match=match):
+            client.status()
+        client.close()
