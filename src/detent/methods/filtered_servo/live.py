@@ -136,8 +136,10 @@ def serve(  # noqa: PLR0913 - as all of its kind
     d, a, g = o.demand, o.answer, c.generator
     a.refused = 0
     if d.fresh:
-        if d.do == REST_OFF and c.deviation.state != FAULT:
-            c.deviation.state, c.busy, g.goal = RESET, 1, g.command  # nothing is commanded any more
+        if d.do == REST_OFF:
+            g.goal = g.command  # nothing is commanded any more
+            if c.deviation.state != FAULT:
+                c.deviation.state, c.busy = RESET, 1
         elif d.do == HOLD:
             reset(c)
         elif d.do == TRAVEL:
