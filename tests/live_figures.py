@@ -202,7 +202,10 @@ def stop_often(bench: Bench, socket: Socket) -> Found:
             continue
         ends, rows = clock_of(bench.loop), bench.host.scope.rows(row)[0]
         places = rows["operation.answer.commanded"]
-        still = int(np.flatnonzero(places != places[-1])[-1]) + 1
+        moved = np.flatnonzero(places != places[-1])
+        if not moved.size:  # nobody had the time to send it while the jog lived
+            continue
+        still = int(moved[-1]) + 1
         found["answered"].append(answered)
         found["zero"].append(ends(int(rows["loop.periods"][still])) - sent)
         found["taken"].append(ends(abs(int(bench.loop.pulled[(bench.loop.pulls - 1) % PULLS]))) - sent)

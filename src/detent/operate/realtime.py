@@ -3,9 +3,11 @@
 import ctypes
 import os
 import sys
+import threading
 from contextlib import suppress
 
 PRIORITY = 80  # of SCHED_FIFO
+NICENESS = -10  # of what brings a person's Stop to the loop: before all that only computes, behind the loop itself
 MCL_CURRENT_AND_FUTURE = 3
 PR_SET_TIMERSLACK = 29
 
@@ -23,6 +25,12 @@ def ask_for_time() -> list[str]:
     if not hasattr(libc, "mlockall") or libc.mlockall(MCL_CURRENT_AND_FUTURE) != 0:
         missing.append("memory that is never swapped out; permit it with: ulimit -l unlimited")
     return missing
+
+
+def ask_to_go_first() -> None:
+    """Let the calling thread have its turn before others that only compute; what permits the loop permits it."""
+    with suppress(OSError, AttributeError):
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
 
 
 def give_back() -> None:

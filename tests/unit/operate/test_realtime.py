@@ -2,12 +2,13 @@
 
 import ctypes
 import os
+import threading
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from detent.operate.realtime import ask_for_time, give_back
+from detent.operate.realtime import NICENESS, ask_for_time, ask_to_go_first, give_back
 
 
 @pytest.fixture
@@ -42,3 +43,16 @@ def test_what_is_not_permitted_is_told_with_what_permits_it(asked: list[str], mo
     assert "ulimit -l unlimited" in memory
     assert asked == ["prctl"]  # without priority its timers are at least exact
     give_back()  # a system without such calls
+
+
+def test_who_brings_a_stop_goes_before_who_only_computes(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[tuple[int, ...]] = []
+    monkeypatch.setattr(os, "setpriority", lambda *asked: found.append(asked), raising=False)
+    ask_to_go_first()
+    assert [one[1:] for one in found] == [(threading.get_native_id(), NICENESS)]
+
+    def refuse(*_: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(os, "setpriority", refuse)
+    ask_to_go_first()  # it goes without
