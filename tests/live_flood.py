@@ -2,7 +2,7 @@
 
 import json
 import sys
-import time
+import threading
 from contextlib import suppress
 from random import Random
 from typing import Any
@@ -20,11 +20,12 @@ def malformed() -> str | bytes:
 
 
 def flood(base: str, cookies: dict[str, str], mark: str, kind: str) -> int:
-    """Send for three seconds, coming back whenever the panel has closed the socket; gives how many were sent."""
-    begin, sent, address = time.monotonic(), 0, base.replace("http", "ws", 1) + "/ws"
+    """Send until nobody listens any more, coming back whenever the panel closes it; gives how many."""
+    sent, address, ending = 0, base.replace("http", "ws", 1) + "/ws", threading.Event()
+    threading.Thread(target=lambda: (sys.stdin.read(), ending.set()), daemon=True).start()
     more: Any = {"Cookie": "; ".join(f"{name}={value}" for name, value in cookies.items())}
     with httpx.Client(base_url=base, cookies=cookies, headers={"x-csrf-token": mark, "origin": base}) as client:
-        while time.monotonic() - begin < 3.0 or (kind == "malformed" and sent < 1000):
+        while not ending.is_set() or sent < 1000:
             ticket = client.post("/api/ticket").text
             dialled = connect(address, origin=base, additional_headers=more, max_queue=None)  # type: ignore[arg-type]
             with suppress(ConnectionClosed, OSError), dialled as ws:

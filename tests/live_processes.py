@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -95,34 +95,57 @@ def flooded(browser: Any, cookies: str, kind: str, socket: Socket, watcher: Any,
     """Stops beside a flood."""
     flood = subprocess.Popen(
         [sys.executable, "-m", "tests.live_flood", browser.base, cookies, browser.form_mark(), kind],
-        stdout=subprocess.PIPE, text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
+    STARTED.append(flood)
     assert flood.stdout is not None
     assert flood.stdout.readline() == "floods\n"
     found = stops(socket, watcher, pids)
-    told = json.loads(flood.communicate(timeout=60)[0])
+    told = json.loads(flood.communicate(timeout=60)[0])  # closes what it listens to
     assert told["sent"] >= (1000 if kind == "malformed" else 5_000)
     return found
 
 
 def computed(pids: Sequence[int]) -> float:
-    """Processor time that processes have used [s]."""
-    return sum(time.clock_gettime(~pid << 3 | 2) for pid in pids)  # as clock_getcpuclockid(3) numbers their clocks
+    """Processor time that processes have used [s], without that of a loop, whose priority is its own."""
+    whole = sum(time.clock_gettime(~pid << 3 | 2) for pid in pids)  # as clock_getcpuclockid(3) numbers their clocks
+    loops = (one for pid in pids for one in Path(f"/proc/{pid}/task").iterdir()
+             if os.sched_getscheduler(int(one.name)) == os.SCHED_FIFO)  # fmt: skip
+    return whole - sum(int((one / "schedstat").read_text(encoding="ascii").split()[0]) for one in loops) * 1e-9
+
+
+@contextmanager
+def going_first() -> Iterator[None]:
+    """The threads of this process before others: while it waits for its turn, the processes that it measures go on."""
+
+    def nice(by: int) -> None:
+        for thread in Path("/proc/self/task").iterdir():
+            with suppress(OSError):
+                os.setpriority(os.PRIO_PROCESS, int(thread.name), by)
+
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    nice(-15)
+    try:
+        yield
+    finally:
+        nice(before)
 
 
 def stops(socket: Socket, watcher: Any, pids: Sequence[int]) -> Stops:
-    """Stops for two seconds.
+    """Stops, as many as 99 of 100 needs.
 
     From the request to its answer nothing sleeps: one of these processes computes, or waits for a processor. The time
-    in which they compute is what a stop takes on a machine that has nothing else to do, however busy this one is.
+    in which they compute is what a stop takes on a machine that has nothing else to do, however busy this one is; what
+    a loop computes beside it, while they wait, is none of it.
     """
     taken: list[tuple[float, float]] = []
-    before, begin = watcher.status["loop"], time.monotonic()
-    while time.monotonic() - begin < 2.0 or len(taken) < 50:
-        at, used = time.perf_counter(), computed(pids)
-        assert "id" in socket.ask(do="stop")
-        taken.append((computed(pids) - used, time.perf_counter() - at))
-        threading.Event().wait(0.005)
+    before = watcher.status["loop"]
+    with going_first():
+        for _ in range(400):
+            at, used = time.perf_counter(), computed(pids)
+            assert "id" in socket.ask(do="stop")
+            taken.append((computed(pids) - used, time.perf_counter() - at))
+            threading.Event().wait(0.005)
     after = watcher.status["loop"]
     share = (after["skipped"] - before["skipped"]) / max(1, after["periods"] - before["periods"])
     return Stops(*(float(one) for one in np.quantile(taken, 0.99, axis=0)), share)

@@ -68,6 +68,7 @@ def live(
 ) -> None:
     """Run an axis live, in wall time, until Ctrl-C: it then comes to rest in a ramp and lets go."""
     from detent.operate.client import LiveAxis
+    from detent.operate.realtime import going_first
     from detent.operate.session import Session
     from detent.operate.start import Place, beside, make_host, shared_memory
     from detent.operate.watchdog import Watchdog
@@ -76,6 +77,7 @@ def live(
     at = PanelPlace(bind, port, certificate, key_file, plain, names or ())
     at.check()
     with ExitStack() as closing:
+        closing.enter_context(going_first())
         place, where, (board, memory) = Place(file), None if no_store else store or beside(file), shared_memory()
         closing.callback(place.leave)
         with compiling_counted(quiet=as_json):

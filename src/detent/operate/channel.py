@@ -26,7 +26,7 @@ from typing import Any, cast
 from detent.errors import AxisError, DetentError
 from detent.files.text import shown
 from detent.operate.audit import Audit
-from detent.operate.realtime import ask_to_go_first
+from detent.operate.realtime import going_first
 from detent.operate.session import LINES, Session, packed
 from detent.operate.words import DURABLE, Ended, why_not_moving
 
@@ -109,9 +109,9 @@ class Channel:
         self.path.unlink(missing_ok=True)
 
     def _serve(self) -> None:
-        ask_to_go_first()
         asyncio.set_event_loop(self._loop)
-        self._loop.run_until_complete(self._listen())
+        with going_first():
+            self._loop.run_until_complete(self._listen())
         self._loop.close()
 
     async def _listen(self) -> None:

@@ -4,7 +4,8 @@ import ctypes
 import os
 import sys
 import threading
-from contextlib import suppress
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
 
 PRIORITY = 80  # of SCHED_FIFO
 NICENESS = -10  # of what brings a person's Stop to the loop: before all that only computes, behind the loop itself
@@ -27,10 +28,22 @@ def ask_for_time() -> list[str]:
     return missing
 
 
-def ask_to_go_first() -> None:
-    """Let the calling thread have its turn before others that only compute; what permits the loop permits it."""
-    with suppress(OSError, AttributeError):
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
+@contextmanager
+def going_first() -> Generator[None]:
+    """Let the calling thread, and what it starts, have its turn before others that only compute, where permitted.
+
+    What permits the priority of the loop permits it. All threads of a process need it: one that waits for its turn
+    while it has the interpreter's lock keeps the others waiting, too.
+    """
+    thread = threading.get_native_id()
+    try:
+        before = os.getpriority(os.PRIO_PROCESS, thread)
+        os.setpriority(os.PRIO_PROCESS, thread, min(before, NICENESS))
+    except (OSError, AttributeError):
+        yield
+    else:
+        yield
+        os.setpriority(os.PRIO_PROCESS, thread, before)
 
 
 def give_back() -> None:

@@ -76,10 +76,10 @@ class Watchdog:
         self._process = self._start()
 
     def _start(self) -> "subprocess.Popen[bytes]":
-        # A session of its own: what is typed at the terminal is not meant for it.
+        # A group of its own: what is typed at the terminal is not meant for it.
         return subprocess.Popen(  # noqa: S603 - Python itself, with numbers
             [sys.executable, "-I", "-S", __file__, str(self._file), *map(str, self._places)],
-            stdin=subprocess.PIPE, pass_fds=[self._file], start_new_session=True,
+            stdin=subprocess.PIPE, pass_fds=[self._file], process_group=0,
         )  # fmt: skip
 
     @property

@@ -12,7 +12,7 @@ from typing import Any
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from detent.operate.realtime import ask_to_go_first
+from detent.operate.realtime import going_first
 from detent.panel.app import Panel
 from detent.panel.gate import Here, Strangers, local_names
 from detent.panel.keys import Keys
@@ -97,6 +97,5 @@ async def _until_told(server: uvicorn.Server, panel: Panel) -> None:
 
 
 if __name__ == "__main__":
-    ask_to_go_first()
-    with contextlib.suppress(KeyboardInterrupt):
+    with contextlib.suppress(KeyboardInterrupt), going_first():
         asyncio.run(serve(json.loads(sys.stdin.readline())))

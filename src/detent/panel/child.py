@@ -71,10 +71,11 @@ class Child:
             "addresses": [place.bind] if place.bind else [*LOOPBACK], "plain": place.on_network,
             "certificate": place.certificate, "key_file": place.key_file,
         }  # fmt: skip
-        # A session of its own: Ctrl-C at the terminal must not close the panel before the axis is at rest.
+        # A group of its own: Ctrl-C at the terminal must not close the panel before the axis is at rest. No session of
+        # its own: Linux shares a processor among sessions first, and there a priority within one counts for nothing.
         self._process = subprocess.Popen(
             [sys.executable, "-m", "detent.panel"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-            start_new_session=True,
+            process_group=0,
         )  # fmt: skip
         assert self._process.stdin is not None  # noqa: S101 - it is a pipe
         assert self._process.stdout is not None  # noqa: S101 - it is a pipe

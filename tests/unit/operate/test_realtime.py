@@ -2,13 +2,12 @@
 
 import ctypes
 import os
-import threading
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from detent.operate.realtime import NICENESS, ask_for_time, ask_to_go_first, give_back
+from detent.operate.realtime import NICENESS, ask_for_time, give_back, going_first
 
 
 @pytest.fixture
@@ -46,13 +45,16 @@ def test_what_is_not_permitted_is_told_with_what_permits_it(asked: list[str], mo
 
 
 def test_who_brings_a_stop_goes_before_who_only_computes(monkeypatch: pytest.MonkeyPatch) -> None:
-    found: list[tuple[int, ...]] = []
-    monkeypatch.setattr(os, "setpriority", lambda *asked: found.append(asked), raising=False)
-    ask_to_go_first()
-    assert [one[1:] for one in found] == [(threading.get_native_id(), NICENESS)]
+    found: list[int] = []
+    monkeypatch.setattr(os, "getpriority", lambda *_: 3, raising=False)
+    monkeypatch.setattr(os, "setpriority", lambda *asked: found.append(asked[-1]), raising=False)
+    with going_first():
+        assert found == [NICENESS]
+    assert found == [NICENESS, 3]
 
     def refuse(*_: object) -> None:
         raise PermissionError
 
-    monkeypatch.setattr(os, "setpriority", refuse)
-    ask_to_go_first()  # it goes without
+    monkeypatch.setattr(os, "getpriority", refuse)
+    with going_first():  # it goes without
+        assert found == [NICENESS, 3]
