@@ -1,4 +1,4 @@
-"""What the thread of the loop asks of the system: priority, and memory that stays."""
+"""What the thread of the loop asks of the system: priority, memory that stays, and a processor of its own."""
 
 import ctypes
 import os
@@ -6,7 +6,9 @@ import sys
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
+ISOLATED = Path("/sys/devices/system/cpu/isolated")  # processors that the system gives to nobody by itself
 PRIORITY = 80  # of SCHED_FIFO
 NICENESS = -10  # of what brings a person's Stop to the loop: before all that only computes, behind the loop itself
 MCL_CURRENT_AND_FUTURE = 3
@@ -25,7 +27,23 @@ def ask_for_time() -> list[str]:
             libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
     if not hasattr(libc, "mlockall") or libc.mlockall(MCL_CURRENT_AND_FUTURE) != 0:
         missing.append("memory that is never swapped out; permit it with: ulimit -l unlimited")
-    return missing
+    return missing + take_processor()
+
+
+def take_processor() -> list[str]:
+    """Take a processor that is kept free of others, where the system has one (isolcpus); what was not permitted."""
+    try:
+        kept = ISOLATED.read_text(encoding="ascii").strip()
+    except OSError:
+        return []
+    if not kept:
+        return []
+    number = int(kept.replace("-", ",").rpartition(",")[2])
+    try:
+        os.sched_setaffinity(0, {number})
+    except OSError:
+        return [f"processor {number}, kept free of others; permit it with: taskset -c 0-{number} detent live"]
+    return []
 
 
 @contextmanager

@@ -2,11 +2,13 @@
 
 import ctypes
 import os
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from detent.operate import realtime
 from detent.operate.realtime import NICENESS, ask_for_time, give_back, going_first
 
 
@@ -21,6 +23,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     calls = {name: call(name, refused) for name, refused in (("prctl", 0), ("mlockall", 0), ("munlockall", 0))}
     monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace(**calls))
     monkeypatch.setattr(os, "sched_setscheduler", lambda *_: found.append("priority"), raising=False)
+    monkeypatch.setattr(realtime, "ISOLATED", Path("nowhere"))
     return found
 
 
@@ -42,6 +45,27 @@ def test_what_is_not_permitted_is_told_with_what_permits_it(asked: list[str], mo
     assert "ulimit -l unlimited" in memory
     assert asked == ["prctl"]  # without priority its timers are at least exact
     give_back()  # a system without such calls
+
+
+@pytest.mark.parametrize(("kept", "taken"), [("3", 3), ("2-3", 3), ("1,4-6", 6)])
+def test_a_processor_that_is_kept_free_is_taken(
+    asked: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kept: str, taken: int
+) -> None:
+    (tmp_path / "isolated").write_text(kept + "\n")
+    monkeypatch.setattr(realtime, "ISOLATED", tmp_path / "isolated")
+    processors: list[set[int]] = []
+    monkeypatch.setattr(os, "sched_setaffinity", lambda _, numbers: processors.append(numbers), raising=False)
+    assert ask_for_time() == []
+    assert processors == [{taken}]
+
+    def refuse(*_: object) -> None:
+        raise OSError(22, "Invalid argument")
+
+    monkeypatch.setattr(os, "sched_setaffinity", refuse)
+    (told,) = ask_for_time()
+    assert f"processor {taken}," in told
+    assert "taskset" in told
+    assert asked == ["priority", "mlockall"] * 2
 
 
 def test_who_brings_a_stop_goes_before_who_only_computes(monkeypatch: pytest.MonkeyPatch) -> None:
