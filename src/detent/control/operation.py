@@ -17,7 +17,9 @@ from detent.control.axis_states import (
     FAULT_REACTION,
     NOT_READY,
     QUICK_STOP,
+    SHUTDOWN,
     SWITCH_ON_DISABLED,
+    SWITCHED_ON,
     ordered,
 )
 from detent.control.reaction import DOUBTS, IN_MOTION, LETS_GO, LOSES, is_among
@@ -111,6 +113,7 @@ class Answer(Registers):
     rests: u1 = register("1 while the commanded point is at rest")
     near: u1 = register("1 while the position is in the window")
     ready: u1 = register("1 once it can be enabled")
+    closed: u1 = register("1 while a brake holds it, which is not open yet")
     limited: u1 = register("1 while the command is at its limit")
     fault: u2 = register("fault that has taken its torque away, 0 none", unit="code")
     alone: u1 = register("1 where one sensor counts the way, and nothing else says where the axis is")
@@ -186,6 +189,12 @@ def tell(o: Operation, do: int) -> None:
     o.demand.fresh = 1
 
 
+@hot_step
+def is_opening(o: Operation) -> bool:
+    """True from enabling until the brake is open: there is torque, and nothing may move yet."""
+    return o.state == SWITCHED_ON and o.demand.do != REST_OFF
+
+
 # ---------------------------------------------------------------------------------------------------- stop and off
 
 
@@ -196,6 +205,9 @@ def stop(o: Operation, by: int) -> None:
     end_running(o, ABORTED, 0, by)
     if o.state == ENABLED:
         halt(o)
+    elif is_opening(o):  # what was asked is not done: it is not enabled
+        o.state = ordered(o.state, SHUTDOWN)
+        leave_torque(o)
 
 
 @step
@@ -247,7 +259,7 @@ def doubt(o: Operation, code: int) -> None:
 @step
 def fail_softly(o: Operation, code: int) -> None:
     """A fault that leaves the loop able to steer: the commanded point comes to rest, and is held."""
-    if o.state in (ENABLED, QUICK_STOP):
+    if o.state in (ENABLED, QUICK_STOP) or is_opening(o):
         o.fault, o.softly = code, 1
         doubt(o, code)
         end_running(o, FAILED, code, 0)
@@ -258,7 +270,7 @@ def fail_softly(o: Operation, code: int) -> None:
 @step
 def lose_torque(o: Operation, code: int) -> None:
     """A fault that has taken the torque, or that leaves nobody to steer by it; without torque there is none to lose."""
-    if o.state in (ENABLED, QUICK_STOP, FAULT_REACTION):
+    if o.state in (ENABLED, QUICK_STOP, FAULT_REACTION) or is_opening(o):
         fail(o, code)
 
 
@@ -272,6 +284,10 @@ def look(o: Operation) -> None:
     a = o.answer
     if o.state == NOT_READY:
         o.state = SWITCH_ON_DISABLED
+    if is_opening(o) and a.closed == 0:
+        o.state = ENABLED
+        if o.kind == ENABLE:
+            end_running(o, DONE, 0, 0)
     if o.state == FAULT_REACTION and (o.softly == 0 or a.rests):
         o.state = FAULT
         if o.softly and is_among(o.fault, LETS_GO):
@@ -302,7 +318,7 @@ def judge(q: OperationParams, o: Operation) -> None:
         o.last_stop = abs(a.commanded - o.stop_from)
     if o.kind == STOP:
         end_running(o, DONE, 0, 0)
-    if o.running and not (o.kind == JOG and d.velocity != 0.0):
+    if o.running and o.kind != ENABLE and not (o.kind == JOG and d.velocity != 0.0):
         o.within = o.within + 1 if a.near else 0
         o.outside = 0 if a.near else o.outside + 1
         if o.within >= q.window_looks and not (o.kind == JOB and q.performs):  # there its moves are done one by one
