@@ -11,7 +11,6 @@ from tests.live_bench import Bench
 
 from detent.control import operation as ops
 from detent.control.guard import FOLLOWING, JUMPED, SATURATED, STUCK
-from detent.methods.cascade.checks import find_cautions
 from detent.methods.cascade.controller import FAULT
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.led import LATE, hear, led
@@ -265,32 +264,6 @@ def test_without_a_brake_there_is_no_place_for_its_fault():
 
 
 # ---- what is said of it
-
-
-@pytest.mark.parametrize(
-    ("overrides", "load"),
-    [
-        (("mechanics.weight=150 N",), "150 N"),
-        (("mechanics.weight=-150 N",), "150 N"),
-        (("disturbance.push.force=80 N", "disturbance.push.at=1 s", "disturbance.push.duration=1 s"), "80 N"),
-        (
-            (
-                "mechanics.weight=150 N", "disturbance.push.force=-80 N", "disturbance.push.at=1 s",
-                "disturbance.push.duration=1 s",
-            ),
-            "230 N",
-        ),
-        ((), ""),
-    ],
-)  # fmt: skip
-def test_a_brake_that_does_not_hold_the_load_of_its_file_is_warned_about(overrides, load):
-    found = {one.name: one for one in find_cautions(spec("brake.force=20 N", *overrides))}
-    assert ("brake.force" in found) == bool(load)
-    if load:
-        assert load in found["brake.force"].limit
-        force = found["brake.force"].remedy.partition("brake.force = ")[2].strip('"')
-        strong = [one.name for one in find_cautions(spec(f"brake.force={force}", *overrides))]
-        assert "brake.force" not in strong
 
 
 def test_a_rotary_axis_has_a_torque():
