@@ -58,7 +58,6 @@ from detent.control.operation import (
     end,
     end_running,
     halt,
-    is_opening,
     leave_torque,
     off,
     stop,
@@ -97,7 +96,7 @@ def obey(q: OperationParams, o: Operation, r: Request) -> None:
         begin_motion(q, o, r)
     else:
         manage(q, o, r)
-        if r.kind == ENABLE and is_opening(o):  # done once its brake is open
+        if r.kind == ENABLE and o.opening:  # done once its brake is open
             end_running(o, ABORTED, 0, r.id)
             o.running, o.kind = r.id, ENABLE
         else:
@@ -171,7 +170,7 @@ def manage(q: OperationParams, o: Operation, r: Request) -> None:
 @step
 def enable(o: Operation) -> None:
     """All the way to operation enabled, if the method is ready; the target is where the axis is."""
-    if o.state != ENABLED and not is_opening(o):
+    if o.state != ENABLED and o.opening == 0:
         o.state = ordered(ordered(o.state, SHUTDOWN), SWITCH_ON)
         take_torque(o)
 
@@ -179,9 +178,11 @@ def enable(o: Operation) -> None:
 @step
 def take_torque(o: Operation) -> None:
     """Hold the axis where it is; operation is enabled at once, or where a brake is closed, when it is open."""
-    if o.answer.closed == 0:
+    if o.answer.closed and o.state == SWITCHED_ON:
+        o.opening = 1
+    else:
         o.state = ordered(o.state, ENABLE_OPERATION)
-    if o.state in (ENABLED, SWITCHED_ON):
+    if o.state == ENABLED or o.opening:
         tell(o, HOLD)
 
 
@@ -196,7 +197,7 @@ def hand_over(o: Operation, r: Request) -> None:
 @step
 def take_order(o: Operation, order: int, number: int) -> None:
     """One order of the control word of CiA 402."""
-    before, opening = o.state, is_opening(o)
+    before, opening = o.state, o.opening
     if opening and order in (ENABLE_OPERATION, RESET_FAULT):
         return
     if order == ENABLE_OPERATION and (o.answer.ready == 0 or o.barred):

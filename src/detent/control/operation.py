@@ -19,7 +19,6 @@ from detent.control.axis_states import (
     QUICK_STOP,
     SHUTDOWN,
     SWITCH_ON_DISABLED,
-    SWITCHED_ON,
     ordered,
 )
 from detent.control.reaction import DOUBTS, IN_MOTION, LETS_GO, LOSES, is_among
@@ -153,6 +152,7 @@ class Operation(Registers):
     looks: i8 = register("looks since power-on", unit="count")
     last_stop: f8 = register("way of the last stop", unit="m")
     stop_from: f8 = register("commanded point at the last stop", unit="m")
+    opening: u1 = register("1 from switched on, with torque, until its brake is open and it is enabled")
     halted: u1 = register("1 while a stop runs out")
     softly: u1 = register("1 while a fault lets the commanded point come to rest, and hold it")
     barred: u2 = register("why the axis may not be enabled, whatever its method says; 0 it may", unit="code")
@@ -189,12 +189,6 @@ def tell(o: Operation, do: int) -> None:
     o.demand.fresh = 1
 
 
-@hot_step
-def is_opening(o: Operation) -> bool:
-    """True from enabling until the brake is open: there is torque, and nothing may move yet."""
-    return o.state == SWITCHED_ON and o.demand.do != REST_OFF
-
-
 # ---------------------------------------------------------------------------------------------------- stop and off
 
 
@@ -205,7 +199,7 @@ def stop(o: Operation, by: int) -> None:
     end_running(o, ABORTED, 0, by)
     if o.state == ENABLED:
         halt(o)
-    elif is_opening(o):  # what was asked is not done: it is not enabled
+    elif o.opening:  # what was asked is not done: it is not enabled
         o.state = ordered(o.state, SHUTDOWN)
         leave_torque(o)
 
@@ -230,7 +224,7 @@ def off(o: Operation, by: int) -> None:
 @hot_step
 def leave_torque(o: Operation) -> None:
     """No torque: a motion has to be confirmed anew."""
-    o.confirmed = o.halted = o.softly = 0
+    o.confirmed = o.halted = o.softly = o.opening = 0
     tell(o, REST_OFF)
 
 
@@ -259,8 +253,8 @@ def doubt(o: Operation, code: int) -> None:
 @step
 def fail_softly(o: Operation, code: int) -> None:
     """A fault that leaves the loop able to steer: the commanded point comes to rest, and is held."""
-    if o.state in (ENABLED, QUICK_STOP) or is_opening(o):
-        o.fault, o.softly = code, 1
+    if o.state in (ENABLED, QUICK_STOP) or o.opening:
+        o.fault, o.softly, o.opening = code, 1, 0
         doubt(o, code)
         end_running(o, FAILED, code, 0)
         o.state = FAULT_REACTION
@@ -270,7 +264,7 @@ def fail_softly(o: Operation, code: int) -> None:
 @step
 def lose_torque(o: Operation, code: int) -> None:
     """A fault that has taken the torque, or that leaves nobody to steer by it; without torque there is none to lose."""
-    if o.state in (ENABLED, QUICK_STOP, FAULT_REACTION) or is_opening(o):
+    if o.state in (ENABLED, QUICK_STOP, FAULT_REACTION) or o.opening:
         fail(o, code)
 
 
@@ -284,8 +278,8 @@ def look(o: Operation) -> None:
     a = o.answer
     if o.state == NOT_READY:
         o.state = SWITCH_ON_DISABLED
-    if is_opening(o) and a.closed == 0:
-        o.state = ENABLED
+    if o.opening and a.closed == 0:
+        o.state, o.opening = ENABLED, 0
         if o.kind == ENABLE:
             end_running(o, DONE, 0, 0)
     if o.state == FAULT_REACTION and (o.softly == 0 or a.rests):

@@ -144,7 +144,7 @@ def status_of(host: Any, fault: str) -> dict[str, Any]:
         "state": STATE_NAMES[o.state], "position": a.position, "velocity": a.velocity, "commanded": a.commanded,
         "error": a.error, "effort": a.effort, "limited": bool(a.limited), "rests": bool(a.rests),
         "at_end": _end_of(host.axis.live.operation, o), "in_window": bool(a.near),
-        "ready": bool(a.ready), "opening": bool(ops.is_opening(o)),
+        "ready": bool(a.ready), "opening": bool(o.opening),
         "trust": TRUSTS[o.trust], "confirmed": bool(o.confirmed),
         "fault": {"code": int(o.fault), "text": fault or host.told(o.fault) or REFUSAL_TEXT.get(o.fault, "")}
         if o.fault else None,
