@@ -21,9 +21,10 @@ from detent.methods.moves.job import Move, MoveJob
 from detent.methods.registry import METHODS
 from detent.operate.faults import injection_of
 from detent.operate.host import operation_params
+from detent.operate.session import Session
 from detent.operate.store import Store
 from detent.operate.trust import Trust, Why
-from detent.operate.words import status_of, why_not_moving
+from detent.operate.words import why_not_moving
 from detent.planning.profile import MotionLimits, plan_move
 
 pytestmark = pytest.mark.compiled
@@ -115,14 +116,11 @@ def test_what_it_waits_for_is_told():
     made = bench(*SLOW)
     made.host.ask(ops.ENABLE)
     made.host.run(5)
-    told = why_not_moving(status(made))
+    session = Session(made.host, {})
+    told = why_not_moving(session.status())
     assert [why for why, _ in told] == ["its brake is opening"]
     made.pass_time(0.4)
-    assert "its brake is opening" not in [why for why, _ in why_not_moving(status(made))]
-
-
-def status(made):
-    return status_of(made.host, "") | {"store": None, "find": ""}
+    assert "its brake is opening" not in [why for why, _ in why_not_moving(session.status())]
 
 
 # ---- it drops with the torque
