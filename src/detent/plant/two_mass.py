@@ -146,7 +146,9 @@ def rigid_acceleration(
         return 0.0
     drive = motor_force(p.winding, r.effort, current, velocity)
     friction = friction_force(p.motor.friction, sense, velocity) + friction_force(p.load.friction, sense, velocity)
-    push = drive - sense * (p.loss * abs(drive) + r.brake) + r.external - load_weight(p, position)
+    push = drive - sense * p.loss * abs(drive) + r.external - load_weight(p, position)
+    if r.brake > 0.0:  # asked, not added: it stands on the longest way through a tick, and most axes have none
+        push -= sense * r.brake
     return (push - friction) / (p.motor.mass + p.load.mass)
 
 
@@ -178,7 +180,9 @@ def accelerations(
     a1 = a2 = 0.0
     if r.motor.sense != 0:
         drive = motor_force(p.winding, r.effort, current, v1)
-        drive -= r.motor.sense * (p.loss * abs(drive) + r.brake)
+        drive -= r.motor.sense * p.loss * abs(drive)
+        if r.brake > 0.0:
+            drive -= r.motor.sense * r.brake
         a1 = (drive - force - friction_force(p.motor.friction, r.motor.sense, v1)) / p.motor.mass
     if r.load.sense != 0:
         drive = force + r.external - load_weight(p, q2)
