@@ -40,8 +40,8 @@ def energy(p: TwoMassParams, r: TwoMass) -> float:
     return kinetic + 0.5 * p.stiffness * strain**2
 
 
-def in_motion(p: TwoMassParams, velocity: float, relative: float) -> TwoMass:
-    r = TwoMass()
+def in_motion(p: TwoMassParams, velocity: float, relative: float, brake: float = 0.0) -> TwoMass:
+    r = TwoMass(brake=brake)
     stand_masses(r, 0.0)
     r.motor.velocity = velocity
     r.load.velocity = velocity + relative if p.stiffness else velocity
@@ -49,9 +49,9 @@ def in_motion(p: TwoMassParams, velocity: float, relative: float) -> TwoMass:
 
 
 @settings(max_examples=150)
-@given(plants(), st.floats(-1, 1), st.floats(-0.3, 0.3))
-def test_without_a_drive_energy_never_grows(p, velocity, relative):
-    r = in_motion(p, velocity, relative)
+@given(plants(), st.floats(-1, 1), st.floats(-0.3, 0.3), forces)
+def test_without_a_drive_energy_never_grows(p, velocity, relative, brake):
+    r = in_motion(p, velocity, relative, brake)
     begin = now = energy(p, r)
     for _ in range(400):
         move_masses(p, r)

@@ -10,6 +10,7 @@ from detent.control.axis_states import (
     RESET_FAULT,
     SHUTDOWN,
     SWITCH_ON,
+    SWITCHED_ON,
     ordered,
 )
 from detent.control.move_commands import begin_motion, can_move_end, move_end, why_not_move
@@ -95,7 +96,11 @@ def obey(q: OperationParams, o: Operation, r: Request) -> None:
         begin_motion(q, o, r)
     else:
         manage(q, o, r)
-        end(o, r.id, DONE, 0, 0)
+        if r.kind == ENABLE and o.opening:  # done once its brake is open
+            end_running(o, ABORTED, 0, r.id)
+            o.running, o.kind = r.id, ENABLE
+        else:
+            end(o, r.id, DONE, 0, 0)
 
 
 @step
@@ -165,10 +170,19 @@ def manage(q: OperationParams, o: Operation, r: Request) -> None:
 @step
 def enable(o: Operation) -> None:
     """All the way to operation enabled, if the method is ready; the target is where the axis is."""
-    if o.state == ENABLED:
-        return
-    o.state = ordered(ordered(ordered(o.state, SHUTDOWN), SWITCH_ON), ENABLE_OPERATION)
-    if o.state == ENABLED:
+    if o.state != ENABLED and o.opening == 0:
+        o.state = ordered(ordered(o.state, SHUTDOWN), SWITCH_ON)
+        take_torque(o)
+
+
+@step
+def take_torque(o: Operation) -> None:
+    """Hold the axis where it is; operation is enabled at once, or where a brake is closed, when it is open."""
+    if o.answer.closed and o.state == SWITCHED_ON:
+        o.opening = 1
+    else:
+        o.state = ordered(o.state, ENABLE_OPERATION)
+    if o.state == ENABLED or o.opening:
         tell(o, HOLD)
 
 
@@ -183,17 +197,20 @@ def hand_over(o: Operation, r: Request) -> None:
 @step
 def take_order(o: Operation, order: int, number: int) -> None:
     """One order of the control word of CiA 402."""
-    before = o.state
+    before, opening = o.state, o.opening
+    if opening and order in (ENABLE_OPERATION, RESET_FAULT):
+        return
     if order == ENABLE_OPERATION and (o.answer.ready == 0 or o.barred):
         return
+    if order == ENABLE_OPERATION and before in (SWITCHED_ON, QUICK_STOP):
+        take_torque(o)
+        return
     o.state = ordered(before, order)
-    if o.state == ENABLED and before != ENABLED:
-        tell(o, HOLD)
     if order == HALT_QUICKLY and o.state == QUICK_STOP and before == ENABLED:
         o.epoch += 1
         end_running(o, ABORTED, 0, number)
         halt(o)
-    elif before in (ENABLED, QUICK_STOP) and o.state not in (ENABLED, QUICK_STOP):
+    elif (before in (ENABLED, QUICK_STOP) or opening) and o.state not in (ENABLED, QUICK_STOP):
         end_running(o, ABORTED, 0, number)
         leave_torque(o)
     if before == FAULT and o.state != FAULT:

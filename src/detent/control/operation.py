@@ -17,6 +17,7 @@ from detent.control.axis_states import (
     FAULT_REACTION,
     NOT_READY,
     QUICK_STOP,
+    SHUTDOWN,
     SWITCH_ON_DISABLED,
     ordered,
 )
@@ -111,6 +112,7 @@ class Answer(Registers):
     rests: u1 = register("1 while the commanded point is at rest")
     near: u1 = register("1 while the position is in the window")
     ready: u1 = register("1 once it can be enabled")
+    closed: u1 = register("1 while a brake holds it, which is not open yet")
     limited: u1 = register("1 while the command is at its limit")
     fault: u2 = register("fault that has taken its torque away, 0 none", unit="code")
     alone: u1 = register("1 where one sensor counts the way, and nothing else says where the axis is")
@@ -150,6 +152,7 @@ class Operation(Registers):
     looks: i8 = register("looks since power-on", unit="count")
     last_stop: f8 = register("way of the last stop", unit="m")
     stop_from: f8 = register("commanded point at the last stop", unit="m")
+    opening: u1 = register("1 from switched on, with torque, until its brake is open and it is enabled")
     halted: u1 = register("1 while a stop runs out")
     softly: u1 = register("1 while a fault lets the commanded point come to rest, and hold it")
     barred: u2 = register("why the axis may not be enabled, whatever its method says; 0 it may", unit="code")
@@ -196,6 +199,9 @@ def stop(o: Operation, by: int) -> None:
     end_running(o, ABORTED, 0, by)
     if o.state == ENABLED:
         halt(o)
+    elif o.opening:  # what was asked is not done: it is not enabled
+        o.state = ordered(o.state, SHUTDOWN)
+        leave_torque(o)
 
 
 @step
@@ -218,7 +224,7 @@ def off(o: Operation, by: int) -> None:
 @hot_step
 def leave_torque(o: Operation) -> None:
     """No torque: a motion has to be confirmed anew."""
-    o.confirmed = o.halted = o.softly = 0
+    o.confirmed = o.halted = o.softly = o.opening = 0
     tell(o, REST_OFF)
 
 
@@ -247,8 +253,8 @@ def doubt(o: Operation, code: int) -> None:
 @step
 def fail_softly(o: Operation, code: int) -> None:
     """A fault that leaves the loop able to steer: the commanded point comes to rest, and is held."""
-    if o.state in (ENABLED, QUICK_STOP):
-        o.fault, o.softly = code, 1
+    if o.state in (ENABLED, QUICK_STOP) or o.opening:
+        o.fault, o.softly, o.opening = code, 1, 0
         doubt(o, code)
         end_running(o, FAILED, code, 0)
         o.state = FAULT_REACTION
@@ -258,7 +264,7 @@ def fail_softly(o: Operation, code: int) -> None:
 @step
 def lose_torque(o: Operation, code: int) -> None:
     """A fault that has taken the torque, or that leaves nobody to steer by it; without torque there is none to lose."""
-    if o.state in (ENABLED, QUICK_STOP, FAULT_REACTION):
+    if o.state in (ENABLED, QUICK_STOP, FAULT_REACTION) or o.opening:
         fail(o, code)
 
 
@@ -272,6 +278,10 @@ def look(o: Operation) -> None:
     a = o.answer
     if o.state == NOT_READY:
         o.state = SWITCH_ON_DISABLED
+    if o.opening and a.closed == 0:
+        o.state, o.opening = ENABLED, 0
+        if o.kind == ENABLE:
+            end_running(o, DONE, 0, 0)
     if o.state == FAULT_REACTION and (o.softly == 0 or a.rests):
         o.state = FAULT
         if o.softly and is_among(o.fault, LETS_GO):
@@ -302,7 +312,7 @@ def judge(q: OperationParams, o: Operation) -> None:
         o.last_stop = abs(a.commanded - o.stop_from)
     if o.kind == STOP:
         end_running(o, DONE, 0, 0)
-    if o.running and not (o.kind == JOG and d.velocity != 0.0):
+    if o.running and o.kind != ENABLE and not (o.kind == JOG and d.velocity != 0.0):
         o.within = o.within + 1 if a.near else 0
         o.outside = 0 if a.near else o.outside + 1
         if o.within >= q.window_looks and not (o.kind == JOB and q.performs):  # there its moves are done one by one

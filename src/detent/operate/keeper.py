@@ -113,7 +113,7 @@ class Keeper:
         with self.lock, self.kept():
             o, loop = self._board.operation, self._board.loop
             now, trust = int(loop.periods), int(o.trust)
-            powered = int(o.taken) < self._asked or int(o.state) in POWERED
+            powered = int(o.taken) < self._asked or bool(o.opening) or int(o.state) in POWERED
             counts, far = self._counts(), self.store.sensor.window
             moved: bool = powered or self._asked != self._still_with or abs(counts - self._last) > far
             self._note(o, counts, (now - self._looked) * loop.period * 1e-9)

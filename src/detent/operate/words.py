@@ -144,7 +144,8 @@ def status_of(host: Any, fault: str) -> dict[str, Any]:
         "state": STATE_NAMES[o.state], "position": a.position, "velocity": a.velocity, "commanded": a.commanded,
         "error": a.error, "effort": a.effort, "limited": bool(a.limited), "rests": bool(a.rests),
         "at_end": _end_of(host.axis.live.operation, o), "in_window": bool(a.near),
-        "ready": bool(a.ready), "trust": TRUSTS[o.trust], "confirmed": bool(o.confirmed),
+        "ready": bool(a.ready), "opening": bool(o.opening),
+        "trust": TRUSTS[o.trust], "confirmed": bool(o.confirmed),
         "fault": {"code": int(o.fault), "text": fault or host.told(o.fault) or REFUSAL_TEXT.get(o.fault, "")}
         if o.fault else None,
         "barred": {"code": int(o.barred), "text": host.told(o.barred) or REFUSAL_TEXT[o.barred]} if o.barred else None,
@@ -208,6 +209,8 @@ def _why_no_torque(status: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "the axis is not ready yet", "wait; after power-on it takes its first position"
     elif state == "quick stop active":
         yield "a quick stop holds it", "enable"
+    elif status["opening"]:
+        yield "its brake is opening", "wait: then it is enabled"
     elif state != "operation enabled" and not fault:
         yield f"no torque: {state}", "enable"
 

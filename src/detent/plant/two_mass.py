@@ -5,7 +5,7 @@
     C = k (q1 - q2 -+ b) + d (v1 - v2)                          coupling, in contact; 0 within the gap of +-b
 
 A transmission that passes the motor's force F on loses a share of it as friction, l |F| against the motion, which adds
-to that of the motor.
+to that of the motor. So does a brake on the motor: a dry friction that is there or not from tick to tick.
 
 A stiffness of 0 means a rigid coupling: masses and frictions add up, and motor and load have one position. Everything
 is in the coordinate of the axis. Units are those of a linear axis; a rotary one has rad for m, N.m for N and kg.m^2
@@ -59,6 +59,7 @@ class TwoMass(Registers):
 
     effort: f8 = register("what the source puts out in this tick: voltage, or force", unit="V, N")
     external: f8 = register("force on the load from outside in this tick, positive pushes in its direction", unit="N")
+    brake: f8 = register("friction of a brake on the motor in this tick, moving or at rest", unit="N")
     current: f8 = register("motor current, positive drives in the positive direction", unit="A")
     motor: Mass = block("motor")
     load: Mass = block("load")
@@ -110,11 +111,11 @@ def find_rigid_sense(p: TwoMassParams, r: TwoMass) -> None:
     if m.velocity != 0.0:
         m.sense = 1 if m.velocity > 0.0 else -1
         return
-    if not (is_dry(first) or is_dry(second) or p.loss > 0.0):
+    if not (is_dry(first) or is_dry(second) or p.loss > 0.0 or r.brake > 0.0):
         m.sense = 1
         return
     drive = motor_force(p.winding, r.effort, r.current, 0.0)
-    push, lost = drive + r.external - load_weight(p, m.position), p.loss * abs(drive)
+    push, lost = drive + r.external - load_weight(p, m.position), p.loss * abs(drive) + r.brake
     m.sense = held_sense(
         holding_force(first.positive) + holding_force(second.positive) + lost,
         holding_force(first.negative) + holding_force(second.negative) + lost,
@@ -132,7 +133,7 @@ def find_senses(p: TwoMassParams, r: TwoMass) -> None:
         return
     force = coupling_force(p, r.side, m.position - n.position, m.velocity - n.velocity)
     push = motor_force(p.winding, r.effort, r.current, m.velocity) - force
-    m.sense = mass_sense(p.motor.friction, m.velocity, push, p.loss * abs(push + force))
+    m.sense = mass_sense(p.motor.friction, m.velocity, push, p.loss * abs(push + force) + r.brake)
     n.sense = mass_sense(p.load.friction, n.velocity, force + r.external - load_weight(p, n.position), 0.0)
 
 
@@ -146,6 +147,8 @@ def rigid_acceleration(
     drive = motor_force(p.winding, r.effort, current, velocity)
     friction = friction_force(p.motor.friction, sense, velocity) + friction_force(p.load.friction, sense, velocity)
     push = drive - sense * p.loss * abs(drive) + r.external - load_weight(p, position)
+    if r.brake > 0.0:  # asked, not added: it stands on the longest way through a tick, and most axes have none
+        push -= sense * r.brake
     return (push - friction) / (p.motor.mass + p.load.mass)
 
 
@@ -178,6 +181,8 @@ def accelerations(
     if r.motor.sense != 0:
         drive = motor_force(p.winding, r.effort, current, v1)
         drive -= r.motor.sense * p.loss * abs(drive)
+        if r.brake > 0.0:
+            drive -= r.motor.sense * r.brake
         a1 = (drive - force - friction_force(p.motor.friction, r.motor.sense, v1)) / p.motor.mass
     if r.load.sense != 0:
         drive = force + r.external - load_weight(p, q2)

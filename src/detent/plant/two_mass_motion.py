@@ -95,7 +95,7 @@ def left_of_regime(p: TwoMassParams, r: TwoMass, event: int, after: State) -> fl
         return flank_left(p, r.side, 1 if event == POSITIVE_FLANK else -1, after[1] - after[3])
     if event == LOAD_REVERSES:
         return after[4] * r.load.sense if p.stiffness > 0.0 and is_dry(p.load.friction) else 0.0
-    dry = p.loss > 0.0 or is_dry(p.motor.friction) or (p.stiffness == 0.0 and is_dry(p.load.friction))
+    dry = p.loss > 0.0 or r.brake > 0.0 or is_dry(p.motor.friction) or (p.stiffness == 0.0 and is_dry(p.load.friction))
     return after[2] * r.motor.sense if dry else 0.0
 
 

@@ -6,7 +6,22 @@ from typing import Any
 import pytest
 
 from detent.control import operation as ops
-from detent.control.axis_states import ENABLED, FAULT, FAULT_REACTION, QUICK_STOP, SWITCH_ON_DISABLED
+from detent.control.axis_states import (
+    DISABLE_OPERATION,
+    DISABLE_VOLTAGE,
+    ENABLE_OPERATION,
+    ENABLED,
+    FAULT,
+    FAULT_REACTION,
+    HALT_QUICKLY,
+    QUICK_STOP,
+    READY,
+    RESET_FAULT,
+    SHUTDOWN,
+    SWITCH_ON,
+    SWITCH_ON_DISABLED,
+    SWITCHED_ON,
+)
 from detent.control.commands import obey, sum_of
 from detent.control.operation import (
     Operation,
@@ -15,6 +30,7 @@ from detent.control.operation import (
     fail_softly,
     judge,
     look,
+    lose_torque,
     off,
     stop,
 )
@@ -312,3 +328,116 @@ def test_any_change_of_a_record_changes_its_sum():
         for other in (value + 1, -value, value + 1e-9 if isinstance(value, float) else value ^ 64):
             changed = [*record[:k], other, *record[k + 1 :]]
             assert sum_of(*changed) != sum_of(*record)
+
+
+# ---- a brake that takes its time
+
+
+def opening(**more: Any) -> tuple[Desk, int]:
+    """An operation that was enabled, whose brake is not open yet."""
+    desk = Desk(**more)
+    desk.a.closed = 1
+    asked = desk.ask(ops.ENABLE)
+    desk.pass_looks(5)
+    return desk, asked
+
+
+def test_it_is_enabled_when_its_brake_is_open():
+    desk, asked = opening()
+    assert (desk.o.state, desk.o.demand.do) == (SWITCHED_ON, ops.HOLD)
+    assert desk.endings == []
+    move = desk.ask(ops.MOVE_TO, 0.5)
+    assert desk.last == (move, ops.REFUSED, ops.NOT_ENABLED, 0)
+    desk.a.closed = 0
+    desk.pass_looks()
+    assert desk.o.state == ENABLED
+    assert desk.last == (asked, ops.DONE, 0, 0)
+    assert desk.o.running == 0
+
+
+def test_without_a_brake_that_is_at_once():
+    desk = Desk()
+    asked = desk.ask(ops.ENABLE)
+    assert (desk.o.state, desk.last) == (ENABLED, (asked, ops.DONE, 0, 0))
+
+
+def test_who_enables_again_takes_the_place_of_the_first_and_nothing_begins_anew():
+    desk, first = opening()
+    second = desk.ask(ops.ENABLE)
+    assert (desk.last, desk.o.demand.fresh) == ((first, ops.ABORTED, 0, second), 0)
+    desk.a.closed = 0
+    desk.pass_looks()
+    assert desk.last == (second, ops.DONE, 0, 0)
+
+
+@pytest.mark.parametrize(("how", "state"), [(stop, READY), (off, SWITCH_ON_DISABLED)])
+def test_what_ends_enabling_takes_the_torque(how, state):
+    desk, asked = opening()
+    how(desk.o, 0)
+    assert (desk.o.state, desk.o.demand.do) == (state, ops.REST_OFF)
+    assert desk.last == (asked, ops.ABORTED, 0, 0)
+    desk.a.closed = 0
+    desk.pass_looks(3)
+    assert desk.o.state == state
+
+
+@pytest.mark.parametrize("kind", [ops.TAKE, ops.LEAVE])
+def test_so_does_another_one_who_commands(kind):
+    desk, asked = opening()
+    desk.ask(kind, client=1 if kind == ops.LEAVE else 2)
+    assert desk.endings[0][:2] == (asked, ops.ABORTED)
+    assert desk.o.demand.do == ops.REST_OFF
+
+
+@pytest.mark.parametrize("softly", [0, 1])
+def test_so_does_a_fault(softly):
+    desk, asked = opening()
+    if softly:
+        desk.a.soft = 10
+    else:
+        desk.a.fault = 3
+    desk.pass_looks(2)
+    assert (desk.o.state, desk.o.demand.do) == (FAULT, ops.REST_OFF)
+    assert desk.last == (asked, ops.FAILED, 10 if softly else 3, 0)
+
+
+def test_so_does_what_leaves_nobody_to_steer():
+    desk, asked = opening()
+    lose_torque(desk.o, 51)
+    assert (desk.o.state, desk.last) == (FAULT_REACTION, (asked, ops.FAILED, 51, 0))
+
+
+@pytest.mark.parametrize(
+    ("order", "state"),
+    [
+        (SHUTDOWN, READY), (SWITCH_ON, SWITCHED_ON), (DISABLE_OPERATION, SWITCHED_ON),
+        (DISABLE_VOLTAGE, SWITCH_ON_DISABLED), (HALT_QUICKLY, SWITCH_ON_DISABLED),
+    ],
+)  # fmt: skip
+def test_an_order_to_another_state_ends_enabling(order, state):
+    desk, asked = opening()
+    number = desk.ask(ops.ORDER, float(order))
+    assert (desk.o.state, desk.o.demand.do) == (state, ops.REST_OFF)
+    assert desk.endings[-2:] == [(asked, ops.ABORTED, 0, number), (number, ops.DONE, 0, 0)]
+    desk.a.closed = 0
+    desk.pass_looks(3)
+    assert desk.o.state == state
+
+
+def test_the_control_word_enables_in_its_steps_and_waits_for_the_brake():
+    desk = Desk()
+    desk.a.closed = 1
+    for order in (SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, ENABLE_OPERATION, RESET_FAULT):
+        desk.ask(ops.ORDER, float(order))
+        desk.pass_looks()
+    assert (desk.o.state, desk.o.demand.do) == (SWITCHED_ON, ops.HOLD)
+    desk.a.closed = 0
+    desk.pass_looks()
+    assert desk.o.state == ENABLED
+
+
+def test_out_of_a_quick_stop_there_is_nothing_to_wait_for():
+    desk = Desk().enabled()
+    desk.ask(ops.ORDER, float(HALT_QUICKLY))
+    desk.ask(ops.ORDER, float(ENABLE_OPERATION))
+    assert (desk.o.state, desk.o.demand.do, desk.o.demand.fresh) == (ENABLED, ops.HOLD, 1)

@@ -60,6 +60,7 @@ def fill_cascade(p: Any, spec: CascadeSpec) -> None:
         ends, switches = p.plant.ends, spec.limit_switches
         ends.present, ends.lower, ends.upper = 1, switches.lower, switches.upper
     ticks = sample_ticks(period, fastest_rate(machine))
+    _fill_brake(p, spec, period / ticks)
     fill_push(p.plant.push, spec.disturbance.push, period / ticks)
     set_clocks(p, period / ticks, ticks)
     if spec.home is not None:
@@ -75,6 +76,15 @@ def kept(spec: CascadeSpec) -> dict[str, float]:
     if spec.axis.motion == "linear":
         del found["method.feed_forward.model.pendulum"]
     return found | {f"protection.{name}": getattr(spec.protection, name) for name in ("stuck_effort", "slip")}
+
+
+def _fill_brake(p: Any, spec: CascadeSpec, tick: Any) -> None:
+    """The controller gives the brake its time in whole samples, so that it is open before they are over."""
+    table, line, brake = spec.brake, p.controller.brake, p.plant.brake
+    if table is not None:
+        line.present, line.open = 1, samples(table.open_time, spec.method.sample_period)
+        brake.force = table.force
+        brake.open, brake.close = samples(table.open_time, tick), samples(table.close_time, tick)
 
 
 def _fill_home(p: Any, spec: CascadeSpec, home: HomeTable) -> None:

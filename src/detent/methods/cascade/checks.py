@@ -249,7 +249,7 @@ RULES = (_motor, _masses, _gains, _encoders, _places, _heat, _rate, _drive, _sup
 def find_cautions(spec: CascadeSpec) -> Iterator[Caution]:
     """Look a cascade axis over."""
     machine = CascadeFigures(spec)
-    for look in (_loops, _bandwidth, _position, _force, _current, _following):
+    for look in (_loops, _bandwidth, _position, _force, _current, _following, _brake):
         yield from look(machine)
 
 
@@ -399,3 +399,19 @@ def _following(m: CascadeFigures) -> Iterator[Caution]:
         limit = f"up to method.in_position, {text(method.in_position, unit)}"
         consequence = "friction or weight may hold the axis outside the window, and the move then fails"
         yield Caution("error at rest", text(m.resting_error, unit), limit, consequence, integral)
+
+
+def _brake(m: CascadeFigures) -> Iterator[Caution]:
+    """The brake holds what pulls at the load for good, and what the file pushes it by, by itself."""
+    spec, unit = m.spec, m.spec.unit("N")
+    if spec.brake is None:
+        return
+    push, weight, pendulum = spec.disturbance.push, spec.mechanics.weight, spec.mechanics.pendulum
+    pushed = abs((push.force if push else 0.0) - weight) + pendulum
+    name, load = max(("weight", spec.holding), ("weight and push", pushed), key=lambda one: one[1])
+    if spec.brake.force < load:
+        limit = f"at least the largest force on the load, {text(load, unit)} of {name}"
+        consequence = "the axis moves though its torque is off and its brake closed"
+        yield Caution(
+            "brake.force", text(spec.brake.force, unit), limit, consequence, remedy_of(spec).least("brake.force", load)
+        )

@@ -6,6 +6,7 @@ answer.
 """
 
 from detent.control import guard
+from detent.control.brake_line import BrakeLine, BrakeLineParams, is_closed, release
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference
 from detent.control.cascade_law import control as control_law
 from detent.control.guard import (
@@ -64,6 +65,7 @@ class CascadeControllerParams(Registers):
     limits: LimitParams = block("what the guard compares with")
     guard: GuardParams = block("how long something may be wrong")
     supervision: SupervisionParams = block("what else there is to watch")
+    brake: BrakeLineParams = block("brake of the motor")
 
 
 class Peaks(Registers):
@@ -93,6 +95,7 @@ class CascadeController(Registers):
     guard: Guard = block("what is wrong")
     weighing: Weighing = block("what the effort makes of a motion against it")
     supervision: Supervision = block("what was seen around the loop")
+    brake: BrakeLine = block("brake of the motor")
     count: i8 = register("motor's encoder at the last sample, for the guard", unit="count")
     within: i8 = register("samples in the window up to this one", unit="count")
     peaks: Peaks = block("largest magnitudes")
@@ -107,6 +110,7 @@ class CascadeLines(Registers):
     ends: EndWires = block("limit switches", by=PLANT)
     sync: u1 = register("1 where the encoders latch in the next tick, and the amplifier then takes over", by=CONTROLLER)
     enable: u1 = register("0: the amplifier takes no command", by=CONTROLLER)
+    brake: u1 = register("1: the brake is released; where there is one", by=CONTROLLER)
     command: f8 = register("command to the amplifier", unit="V", by=CONTROLLER)
 
 
@@ -115,11 +119,12 @@ class CascadeLines(Registers):
 
 @step
 def power_on(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines, position: float) -> None:
-    """At rest, the lines showing where, the loops closed and the reference at `position` [m]."""
+    """At rest, the lines showing where, its brake open, the loops closed and the reference at `position` [m]."""
     stand_sensor(p.motor_sensor, c.motor_sensor, lines.motor)
     stand_sensor(p.load_sensor, c.load_sensor, lines.load)
     c.reference.position, c.count = position, lines.motor.count
     c.on = c.known = lines.enable = lines.sync = 1
+    lines.brake = p.brake.present
 
 
 @step
@@ -218,11 +223,14 @@ def note_peaks(c: CascadeController) -> None:
 
 @step
 def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> int:
-    """One sample of the guard; the code of the fault that switches off, 0 for none."""
+    """One sample of the guard; the code of the fault that switches off, 0 for none.
+
+    Against a brake that still opens an effort may be at its limit, and move nothing.
+    """
     error = abs(c.law.position_error)
     late = (not error <= p.limits.following_error) + (not error <= 2.0 * p.limits.following_error)
-    pushing = 0
-    if abs(c.law.command) >= p.limits.breaking:
+    pushing, held = 0, is_closed(p.brake, c.brake)
+    if abs(c.law.command) >= p.limits.breaking and not held:
         pushing = 1 if c.law.command > 0.0 else -1
     place, side = c.load_sensor.position if p.limits.place_on_load else c.motor_sensor.position, 0
     if c.known and not place <= p.limits.highest:
@@ -234,7 +242,7 @@ def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> 
     watch_number(p.guard, c.guard, error)
     watch_number(p.guard, c.guard, c.law.command)
     weigh_effort(c.weighing, c.guard, c.law.command, moved)
-    return watch(p.guard, c.guard, late, side, c.law.limited > 0, pushing, moved)
+    return watch(p.guard, c.guard, late, side, c.law.limited > 0 and not held, pushing, moved)
 
 
 @step
@@ -285,6 +293,9 @@ def sample(
             output = output if c.on else 0.0
     warm_up(p.supervision, c.supervision, output)
     lines.enable, lines.command = c.on, output
+    if p.brake.present:
+        release(p.brake, c.brake, c.on)
+        lines.brake = c.on
 
 
 @controls(CascadeControllerParams)

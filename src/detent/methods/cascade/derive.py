@@ -26,7 +26,7 @@ def position_sensors(spec: CascadeSpec) -> dict[str, PositionSensor]:
     return {
         "": PositionSensor(
             sensor=sensor, kind=Sensed.INCREMENTAL, scale=scale, unit=spec.unit("m"),
-            ends=(spec.limits.lowest, spec.highest), window=window,
+            ends=(spec.limits.lowest, spec.highest), window=window, held=spec.brake is not None,
         )
     }  # fmt: skip
 

@@ -15,6 +15,7 @@ from detent.plant.injection import (
     INTERMITTENT,
     OFF,
     PUSH,
+    STUCK,
     WORD_KINDS,
     Injection,
     Place,
@@ -24,7 +25,7 @@ from detent.plant.injection import (
 from detent.sensing.home_marks import EndWires
 from detent.sensing.position_sensor import EncoderWord
 
-MOTOR, LOAD, DRIVE, MACHINE, MOTOR_LINK, LOAD_LINK, LOWER, UPPER, BOTH = range(1, 10)
+MOTOR, LOAD, DRIVE, MACHINE, MOTOR_LINK, LOAD_LINK, LOWER, UPPER, BOTH, BRAKE = range(1, 11)
 
 
 @step
@@ -67,7 +68,7 @@ def spoil_lines(p: CascadePlantParams, f: Injection, lines: CascadeLines) -> Non
         spoil_link(f, lines.motor)
     elif f.place == LOAD_LINK:
         spoil_link(f, lines.load)
-    elif f.place >= LOWER:
+    elif f.place in (LOWER, UPPER, BOTH):
         spoil_ends(f, lines.ends)
 
 
@@ -96,6 +97,9 @@ def disturbed_tick(p: CascadeParams, r: Cascade, f: Injection, *feed: HostArray)
     if plant.latched and f.place == DRIVE:
         f.since += 1
         lines.command = spoilt_effort(f, 0, lines.command, p.controller.law.max_command)
+    if plant.latched and f.place == BRAKE:
+        f.since += 1
+        lines.brake = 1 if spoilt(f, 0, lines.brake, lines.brake, 1.0) else 0
     force, begin, end = push.force, push.begin, push.end
     if f.place == MACHINE and f.kind == PUSH:
         push.force, push.begin, push.end = f.amount, r.tick, r.tick + 1
@@ -125,6 +129,8 @@ def places(spec: CascadeSpec, params: CascadeParams, period: float) -> Mapping[s
     for name, number in (("lower switch", LOWER), ("upper switch", UPPER), ("both switches", BOTH)):
         if spec.limit_switches is not None:
             both[name] = Place(number, (OFF, INTERMITTENT), period, time=80 * period)
+    if spec.brake is not None:
+        both["brake"] = Place(BRAKE, (OFF, STUCK, INTERMITTENT), period, time=80 * period)
     push, push_unit = 0.5 * spec.limits.effort, spec.unit("N")
     return both | {
         "drive": Place(DRIVE, WORD_KINDS, period, time=80 * period),

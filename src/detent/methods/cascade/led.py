@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from detent.control.brake_line import release
 from detent.control.operation import OperationParams
 from detent.errors import DetentError
 from detent.kernel.loop import HostArray, advance, lay_ready, ticks
@@ -22,9 +23,12 @@ from detent.methods.cascade.controller import CascadeController, CascadeControll
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.live import live_of
 from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.cascade.system import rest_off
 from detent.methods.method import Board, Live, Plant, Wiring
 from detent.sensing.home_marks import HomeWires
 from detent.sensing.position_sensor import EncoderWord, read_word
+
+LATE = 4  # samples by which what closes the loops may hear of it later, and open the brake of its motor
 
 NO_ROWS = np.zeros((1, 0), np.uint8), np.zeros(0, np.int64), 0
 
@@ -66,6 +70,8 @@ def hear(p: CascadeControllerParams, c: CascadeController, lines: LedLines) -> N
     if told:
         read_word(p.motor_sensor, c.motor_sensor, lines.motor)
         c.samples = lines.samples
+        if p.brake.present:
+            release(p.brake, c.brake, c.on)
     c.law.command = lines.command
     c.law.limited = 1 if abs(lines.command) >= p.law.max_command else 0
     if c.on:
@@ -129,7 +135,10 @@ def led(spec: CascadeSpec, operation: Callable[..., OperationParams], mode: str)
     made: Any = live_of(host, operation)
     state: Any = LedCascade(controller=host.controller)
     host.controller = state.controller  # of which a fault is told
-    params = LedParams(controller=host.params.controller, on_velocity=int(mode == "velocity"))
+    params: Any = LedParams(controller=host.params.controller, on_velocity=int(mode == "velocity"))
+    if spec.brake is not None:
+        params.controller.brake.open += LATE
+        state.controller.brake.left = params.controller.brake.open
     made.live.look_ticks = 1
     return replace(made, params=params, state=state, tick=lines.sample, feed=()), lines
 
@@ -142,7 +151,8 @@ def led_machine(spec: CascadeSpec, mode: str) -> tuple[Plant, Wiring]:
     host, lines = CascadeHost(spec), led_wiring(spec, mode)
     state: Any = LedCascade()
     c: Any = host.controller
-    c.on = c.known = c.guarded = 0  # it is its master that watches
+    rest_off(host.params, host.state)
+    c.known = c.guarded = 0  # it is its master that watches
     law = host.params.controller.law
     forward = law.feed_forward
     forward.acceleration = forward.viscous = forward.coulomb_positive = forward.coulomb_negative = 0.0

@@ -38,6 +38,7 @@ from detent.methods.cascade.faults import places
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.run import describe_cause
 from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.cascade.system import rest_off
 from detent.methods.method import Live
 from detent.methods.moves.legs import legs_of
 from detent.planning.course import Course, CourseLimits, advance, begin_at, come_to_rest, go_to, is_at_rest, run_at
@@ -166,6 +167,7 @@ def serve(  # noqa: PLR0913 - as all of its kind
     a.rests = 1 if is_at_rest(course) and memory.homing.phase == IDLE else 0
     a.near = 1 if abs(a.error) <= q.settled else 0
     a.ready = 1
+    a.closed = 1 if p.brake.present and (c.on == 0 or c.brake.left > 0) else 0
     driven = o.demand.do != REST_OFF
     a.fault = c.guard.hard if c.on == 0 and driven else 0
     a.soft = c.guard.code if c.on and driven else 0
@@ -179,7 +181,7 @@ def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[s
 def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Live:
     """The axis of a host."""
     spec, limits = host.spec, motion_limits(host.spec)
-    host.controller.on = 0
+    rest_off(host.params, host.state)
     host.params.controller.guard.softly = SOFT
     q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
     q.settled = host.params.controller.limits.window

@@ -1,9 +1,10 @@
-"""The machine of a cascade axis: amplifier, motor, coupling and load, both encoders, and who watches them."""
+"""The machine of a cascade axis: amplifier, motor, brake, coupling and load, both encoders, and who watches them."""
 
 from detent.drive.effort_source import EffortSource, EffortSourceParams, take_command
 from detent.kernel.registers import Registers, block, f8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.methods.cascade.controller import CascadeLines
+from detent.plant.brake import Brake, BrakeParams, brake_force
 from detent.plant.hard_stop import HardStop, stop_force
 from detent.plant.push import Push, push_force
 from detent.plant.two_mass import TwoMass, TwoMassParams
@@ -30,6 +31,7 @@ class CascadePlantParams(Registers):
     home: HomeMarksParams = block("switch and marks by which it finds its reference")
     ends: EndSwitchParams = block("limit switches, passed by the load")
     stop: HardStop = block("hard stop at one end of the way of the load")
+    brake: BrakeParams = block("brake of the motor")
 
 
 class CascadePlant(Registers):
@@ -40,6 +42,7 @@ class CascadePlant(Registers):
     machine: TwoMass = block("motor, coupling and load")
     home: HomeMarks = block("switch and marks by which it finds its reference")
     gauge: Gauge = block("what an observer sees of the move of the load")
+    brake: Brake = block("brake of the motor")
 
 
 @step
@@ -68,6 +71,8 @@ def move(p: CascadePlantParams, plant: CascadePlant, machine: TwoMass, tick: int
         take_command(p.source, plant.source, lines.command if lines.enable else 0.0)
         machine.effort = plant.source.output
         plant.latched = 0
+    if p.brake.force > 0.0:
+        machine.brake = brake_force(p.brake, plant.brake, lines.brake)
     machine.external = push_force(p.push, tick)
     if p.stop.side != 0.0:
         machine.external += stop_force(p.stop, machine.load.position, machine.load.velocity)

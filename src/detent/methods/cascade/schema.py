@@ -174,6 +174,16 @@ class MechanicsTable(Table, frozen=True):
     coupling: CouplingTable | None = None
 
 
+class BrakeTable(Table, frozen=True):
+    """Holding brake on the motor's side of the coupling, closed by a spring: open while there is torque."""
+
+    force: Force = required(
+        "largest force on the axis that it holds (rotary: torque)", '"200 N"', turned='"2 N*m"', gt=0.0, le=1e7
+    )
+    open_time: Time = optional("time until it is open; the axis is not enabled before", 60e-3, ge=0.0, le=10.0)
+    close_time: Time = optional("time until it is closed", 40e-3, ge=0.0, le=10.0)
+
+
 class EncoderTable(Table, frozen=True):
     """Encoder that is read once per sample."""
 
@@ -326,6 +336,7 @@ class CascadeSpec(AxisSpec, frozen=True):
     motor: CascadeMotorTable | None = begun()
     drive: DriveTable = Field(default_factory=DriveTable)
     mechanics: MechanicsTable = Field(default_factory=MechanicsTable)
+    brake: BrakeTable | None = None
     encoder: EncoderTable
     load_encoder: EncoderTable | None = None
     method: MethodTable = Field(default_factory=MethodTable)

@@ -1,6 +1,7 @@
 """The cascade axis, wired as its block diagram: the usual servo of today, which the five methods are compared with.
 
-    controller                           lines            plant
+    controller                           lines            plant           brake
+                                                                            |
     reference -> position loop -> velocity loop - command -> amplifier -> motor -> coupling -> load
                      ^                 ^                     (delay)        |                    |
                      +-----------------+--------- counts <- encoders <------+--------------------+
@@ -135,6 +136,14 @@ def switch_on(p: CascadeParams, r: Cascade, position: float, act: Act = do) -> N
     latch_both(p.plant, r.plant.machine, lines)
     stand_home(p.plant.home, r.plant.home, lines.home, position)
     act(power_on, p.controller, r.controller, lines, position)
+
+
+def rest_off(p: CascadeParams, r: Cascade) -> None:
+    """Be without torque at power-on; a brake is closed."""
+    c, brake = r.controller, p.controller.brake
+    c.on = 0
+    if brake.present:
+        c.brake.left, r.lines.brake, r.plant.brake.closed = brake.open, 0, 1
 
 
 def set_off(p: CascadeParams, r: Cascade, velocity: float) -> None:

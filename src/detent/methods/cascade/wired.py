@@ -67,7 +67,7 @@ def control_tick(p: WiredCascadeParams, r: WiredCascade, *feed: HostArray) -> bo
 def machine_tick(p: CascadeMachineParams, r: CascadeMachine) -> bool:
     """One substep of the mechanics."""
     sense(p.plant, r.plant, r.plant.machine, r.lines)
-    r.lines.sync = 0
+    r.lines.sync, r.lines.brake = 0, r.lines.enable  # a drive opens the brake of its motor with its own torque
     move(p.plant, r.plant, r.plant.machine, r.tick, r.lines)
     r.tick += 1
     return True
@@ -121,6 +121,7 @@ def machine(spec: CascadeSpec, mode: str = "torque") -> dict[str, tuple[Plant, W
     params, state = CascadeMachineParams(plant=built.plant), CascadeMachine()
     params.plant.source.delay -= 1
     stand_masses(state.plant.machine, spec.mechanics.start_position)
+    state.plant.brake.closed = spec.brake is not None
     latch_both(params.plant, state.plant.machine, state.lines)
     advance(params, state, 0, *NO_ROWS)  # compiles
     ticks_of_sample = built.controller.sample_ticks

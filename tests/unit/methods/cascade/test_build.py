@@ -167,6 +167,9 @@ HOMED = {
 }
 """How a live axis finds its reference, and where in the machine that is."""
 
+BRAKED = {"brake.force": "300 N", "brake.open_time": "50 ms", "brake.close_time": "30 ms"}
+"""What holds an axis that is switched off."""
+
 
 def load(name, *overrides):
     text = example_text(name)
@@ -212,8 +215,22 @@ def test_a_key_changes_the_run(key):
 def test_every_key_is_tried():
     keys = {row.key for row in reference_rows("cascade")}
     watched = set(GUARDED) | set(SUPERVISED)
-    assert set(CHANGES) | watched | set(HOMED) | ROTARY | SAID | HOST == keys
-    assert len(CHANGES) + len(watched) + len(HOMED) + len(ROTARY | SAID | HOST) == len(keys)
+    assert set(CHANGES) | watched | set(HOMED) | set(BRAKED) | ROTARY | SAID | HOST == keys
+    assert len(CHANGES) + len(watched) + len(HOMED) + len(BRAKED) + len(ROTARY | SAID | HOST) == len(keys)
+
+
+@pytest.mark.parametrize("key", BRAKED)
+def test_a_key_changes_how_an_axis_falls_that_is_switched_off_and_on(key):
+    seen = []
+    for change in ((), (f"{key}={BRAKED[key]}",)):
+        spec = load("cascade", "brake.force=100 N", "mechanics.weight=200 N", *change)
+        rig = Rig(build_cascade(spec), spec.mechanics.start_position)
+        ticks = 400 * rig.p.controller.sample_ticks
+        for on in (1, 0, 1):
+            rig.r.controller.on = on
+            rig.run(ticks)
+        seen.append(rig.r.plant.machine.load.position)
+    assert seen[0] != seen[1]
 
 
 @pytest.mark.parametrize("key", HOMED)

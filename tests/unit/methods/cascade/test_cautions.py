@@ -15,6 +15,7 @@ PID = (
     "method.derivative=100 V*s/m",
     "method.derivative_filter=0.2 ms",
 )
+FROM_ABOVE = [f"disturbance.push.{key}" for key in ("force=-80 N", "at=1 s", "duration=1 s")]
 
 
 @pytest.fixture
@@ -35,6 +36,7 @@ def cautions(load_text, good_text, rotary_text):
         ("turntable", ()),
         ("cascade", (*PID, "method.derivative=60 V*s/m")),
         ("cascade", (*TUNED, "method.velocity_integral=0 V/m")),
+        ("cascade", (*TUNED, "brake.force=150 N", "mechanics.weight=150 N")),
         ("turntable", ("mechanics.coupling.backlash=0.1 deg", "method.feedback.position=motor")),
     ],
 )
@@ -85,6 +87,13 @@ CASES = [
     ),
     ("cascade", ["method.velocity_integral=0 V/m", "method.in_position=20 um"], "error at rest"),
     ("cascade", [*PID, "method.integral=0 V/(m*s)", "method.in_position=20 um"], "error at rest"),
+    ("cascade", ["brake.force=20 N", "mechanics.weight=-150 N"], "brake.force"),
+    (
+        "cascade",
+        ["brake.force=20 N", "mechanics.weight=150 N", *FROM_ABOVE],
+        "brake.force",
+    ),
+    ("turntable", ["brake.force=10 mN*m", "mechanics.pendulum=0.1 N*m"], "brake.force"),
 ]
 
 

@@ -45,11 +45,14 @@ def noisy_params(variant: str) -> CascadeParams:
         law.pid.proportional, law.pid.integral, law.pid.derivative = 8000.0, 2000.0, 300.0
         law.pid.smoothing = 0.5
         c.feedback.position_on_load = c.feedback.velocity_on_load = 1
+    if variant == "brake":
+        p.plant.brake.force, p.plant.brake.open, p.plant.brake.close = 12.0, 70, 45
+        c.brake.present, c.brake.open = 1, 4
     fill_clocks(p, TICK, SAMPLE_TICKS)
     return p
 
 
-VARIANTS = ("rigid", "coupled", "backlash")
+VARIANTS = ("rigid", "coupled", "backlash", "brake")
 
 
 def run_hash(variant: str) -> str:
@@ -70,6 +73,10 @@ def run_hash(variant: str) -> str:
     rig.r.controller.entry = 0
     rig.drive(12.0 * np.sin(np.arange(60)), 1200)
     digest.update(rig.r.snapshot())
+    for on in (0, 1):
+        rig.r.controller.on, rig.r.controller.entry = on, 0
+        rig.drive(12.0 * np.sin(np.arange(15)), 300)
+        digest.update(rig.r.snapshot())
     assert rig.r.plant.machine.load.position != 0.0
     return digest.hexdigest()
 
