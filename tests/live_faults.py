@@ -26,8 +26,9 @@ FILES = {
 }  # fmt: skip
 EQUIPPED = (
     "encoder.checked=true", "load_encoder.resolution=1 um", "load_encoder.checked=true", "limit_switches.lower=-10 mm",
+    "brake.force=1 kN",
 )  # fmt: skip
-"""What the cascade example has not got: encoders with a check, one on the load, and limit switches."""
+"""What the cascade example has not got: encoders with a check, one on the load, limit switches, and a brake."""
 STATES = ("power-up", "rest", "move", "stop", "quick stop")
 LOOKED = 1.2  # time in which a fault is waited for [s]
 
