@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from detent.analysis.linear_system import LinearSystem, Margins
+from detent.analysis.linear_system import LinearSystem
+from detent.analysis.margins import Margins
 from detent.axisfile.tables import AxisSpec
 from detent.methods.registry import METHODS
 from detent.methods.tuning import Response
