@@ -729,6 +729,9 @@ def test_27_where_the_file_does_not_say_how_friction_falls_there_is_a_table():
     assert outcomes[1.0, 3e-3] in ("rests", "flickers")
     assert outcomes[2.0, 0.0] == "hunts"
     assert any("of 16 that may be" in one for one in found.told)
+    tuned = axis_of_text(text, (*friction, "drive.command_step=0 V", "encoder.resolution=0.1 um")).tune()
+    assert len(tuned.table.rows) == 4
+    assert any("of 16 that may be" in one for one in tuned.why)
 
 
 def machines(folder, entries: str = SET_OF_8, target: float = 0.12) -> Question:

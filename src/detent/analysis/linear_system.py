@@ -4,44 +4,25 @@
 
 Of a loop cut open, w goes in behind the cut and y comes out before it with its sign turned: w = -y closes it, and
 L(z) = C (z - A)^-1 B + D is its gain.
-
-A margin holds for everything: Ms, the largest sensitivity, is the inverse of the least distance of L from -1, which
-needs no crossing to be seen (Astrom, Hagglund 2006, Advanced PID Control, section 4.6). It guarantees a gain margin of
-Ms/(Ms - 1) and a phase margin of 2 asin(1/(2 Ms)).
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from detent.analysis.margins import Margins, around, crossing, largest_level, margins_of, one_of, usual_frequencies
 from detent.errors import DetentError
 
 Numbers = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
 Respond = Callable[[Numbers], Phasors]  # response at frequencies [Hz], shape (n,)
 
-GRID = 4000  # frequencies at which a loop is looked at, evenly spaced on a logarithmic scale
-DECADES = 6  # of frequency, below half the sample rate
-AROUND = 40  # more of them inside each resonance
-ZOOM, ZOOMS = 65, 3  # points and times by which a crossing or a peak is looked at closer: to some 1e-8 of the frequency
 MOST_ELEMENTS = 4_000_000  # of matrices that are solved at once
-
-
-class Margins(NamedTuple):
-    """What a loop that is cut open leaves; where it never crosses a gain of 1 there is nothing to lose."""
-
-    crossover: float  # frequency at which the gain first falls below 1 [Hz]; 0 where it never does
-    phase: float  # smallest phase margin over all crossings [rad]; pi where there is none
-    gain: float  # smallest factor above 1 of the gain at which L passes -1; infinite where there is none
-    delay: float  # dead time that may be added until it no longer settles [s]; infinite where there is none
-    sensitivity: float  # Ms, largest magnitude of 1/(1 + L)
-    peak: float  # frequency of it [Hz]
-    least: float = 0.0  # largest factor below 1 of the gain at which L passes -1; 0 where there is none
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -58,6 +39,8 @@ class LinearSystem:
         What it is.
     quick : callable, optional
         The same response at frequencies [Hz], shape (n,), from a form that takes less time than the matrices.
+    known : callable, optional
+        Gives its margins, where they are found together with those of other cuts.
 
     >>> import numpy as np
     >>> one = np.eye(1)
@@ -73,6 +56,7 @@ class LinearSystem:
     dt: float
     name: str
     quick: Respond | None = None
+    known: Callable[[], Margins] | None = None
 
     def response(self, frequencies: ArrayLike) -> Phasors:
         """Response y/w at frequencies [Hz] below half the sample rate, shape as given."""
@@ -92,16 +76,26 @@ class LinearSystem:
 
     def frequencies(self) -> Numbers:
         """Where it is looked at: a logarithmic grid up to half the sample rate, finer around each resonance [Hz]."""
-        modes = np.linalg.eigvals(self.a)
+        grid = np.concatenate([usual_frequencies(self.dt), self._resonances])
+        return np.unique(grid[grid < 0.5 / self.dt])
+
+    @property
+    def _resonances(self) -> Numbers:
+        """Frequencies inside the resonances [Hz]."""
+        modes = np.linalg.eigvals(self.a).astype(np.complex128)
         modes = modes[(np.abs(modes) > 0.5) & (modes.imag > 0.0)]
-        rates = np.log(modes) / (2 * np.pi * self.dt)
-        more = [rate.imag + np.linspace(-4.0, 4.0, AROUND) * max(-rate.real, 1e-6 * rate.imag) for rate in rates]
-        grid = np.concatenate([usual_frequencies(self.dt), *more])
-        return np.unique(grid[(grid > 0.0) & (grid < 0.5 / self.dt)])
+        rates: Any = np.log(modes) / self.dt
+        return around(rates, self.dt)
 
     def margins(self) -> Margins:
         """Margins, where the system is a loop that is cut open."""
-        return margins_of(self.response, self.frequencies(), self.dt)
+        if self.known is not None:
+            return self.known()
+
+        def respond(frequencies: Numbers, _: Any) -> Phasors:
+            return self.response(np.atleast_2d(frequencies))[None]
+
+        return one_of(margins_of(respond, self._resonances[None], self.dt)[0])
 
     def closed(self, gain: float = 1.0) -> "LinearSystem":
         """The loop closed with so much more gain: T = L/(1 + L), from what is put in at the cut to what comes back."""
@@ -124,7 +118,7 @@ class LinearSystem:
         if above[-1] + 1 == len(frequencies):
             return 0.5 / self.dt
         low, high = frequencies[above[-1]], frequencies[above[-1] + 1]
-        return _crossing(self.response, lambda found: _level(found) - math.log(limit), float(low), float(high))
+        return crossing(lambda at: np.abs(self.response(at)) - limit, float(low), float(high))
 
     @property
     def spectral_radius(self) -> float:
@@ -145,12 +139,6 @@ class LinearSystem:
                 "take to_scipy()"
             ) from error
         return control.StateSpace(self.a, self.b, self.c, self.d, self.dt, name=self.name.replace(" ", "_"))
-
-
-def usual_frequencies(dt: float) -> Numbers:
-    """Frequencies of an open loop that is sampled every `dt` [s], up to half the sample rate [Hz], shape (GRID,)."""
-    highest = math.log10(0.5 / dt)
-    return np.logspace(highest - DECADES, highest, GRID, endpoint=False)
 
 
 def gain_limit(radius: Callable[[float], float], largest: float, step: float = 1.2) -> float:
@@ -174,66 +162,3 @@ def gain_limit(radius: Callable[[float], float], largest: float, step: float = 1
         middle = math.sqrt(low * high)
         low, high = (middle, high) if radius(middle) < 1.0 else (low, middle)
     return low
-
-
-def margins_of(respond: Respond, frequencies: Numbers, dt: float) -> Margins:
-    """Margins of an open loop: looked for on a grid of frequencies [Hz], each then looked at closer."""
-    frequencies = np.append(frequencies, 0.5 / dt)  # an alternating mode is lost there
-    loop = respond(frequencies)
-    gain = _level(loop)
-    places = _changes(gain)
-    crossings = [_crossing(respond, _level, frequencies[k], frequencies[k + 1]) for k in places]
-    turns = [k for k in _changes(loop.imag) if loop.real[k] < 0.0]
-    real = [respond(np.array([_crossing(respond, np.imag, frequencies[k], frequencies[k + 1])]))[0].real for k in turns]
-    real.append(loop[-1].real)
-    factors = [-1.0 / float(value) for value in real if value < 0.0]
-    more, less = [one for one in factors if one > 1.0], [one for one in factors if one < 1.0]
-    falling = [one for one, k in zip(crossings, places, strict=True) if gain[k] >= 0.0]
-    phases = [math.remainder(float(np.angle(-respond(np.array([one]))[0])), math.tau) for one in crossings]
-    late = [(phase % math.tau) / (math.tau * one) for phase, one in zip(phases, crossings, strict=True)]
-    level, peak = largest_level(lambda at: _sensitivity(respond(at)), frequencies, _sensitivity(loop))
-    crossover = falling[0] if falling else 0.0
-    phase = min(phases, key=abs) if falling else math.pi
-    gains = min(more, default=math.inf), max(less, default=0.0)
-    return Margins(crossover, phase, gains[0], min(late, default=math.inf), level, peak, gains[1])
-
-
-def _changes(values: Numbers) -> list[int]:
-    """Places before a change of sign."""
-    return np.flatnonzero(np.signbit(values[1:]) != np.signbit(values[:-1])).tolist()
-
-
-def _level(loop: Phasors) -> Numbers:
-    return np.log(np.maximum(np.abs(loop), 1e-300))
-
-
-def _crossing(respond: Respond, part: Callable[[Phasors], Numbers], low: float, high: float) -> float:
-    """Frequency between two at which a part of the response changes its sign [Hz]."""
-    for _ in range(ZOOMS):
-        grid = np.geomspace(low, high, ZOOM)
-        below = np.signbit(part(respond(grid)))
-        # An end may have come to lie on the other side by rounding.
-        first = int(np.argmax(below != below[0])) or 1
-        low, high = float(grid[first - 1]), float(grid[first])
-    return math.sqrt(low * high)
-
-
-def largest_level(
-    level: Callable[[Numbers], Numbers], frequencies: Numbers, levels: Numbers | None = None
-) -> tuple[float, float]:
-    """Largest value of a positive function of frequency, looked for on a grid [Hz], and where it lies [Hz].
-
-    `levels` are its values on the grid, where they are known already.
-    """
-    levels = level(frequencies) if levels is None else levels
-    for _ in range(ZOOMS):
-        top = int(np.argmax(levels))
-        low, high = float(frequencies[max(top - 1, 0)]), float(frequencies[min(top + 1, len(frequencies) - 1)])
-        frequencies = np.geomspace(low, high, ZOOM, dtype=np.float64)
-        levels = level(frequencies)
-    top = int(np.argmax(levels))
-    return float(levels[top]), float(frequencies[top])
-
-
-def _sensitivity(loop: Phasors) -> Numbers:
-    return 1.0 / np.maximum(np.abs(1.0 + loop), 1e-300)

@@ -1,12 +1,17 @@
 """`detent tune` and `detent hunt`: gains with margins, and whether the axis hunts at standstill."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from detent.cli.app import NOT_DONE, File, Force, Job, Json, Set, app, option
 from detent.cli.terminal import print_json, print_table, progress_bar, say, split_names
+
+if TYPE_CHECKING:
+    from detent.tune.searched import Searched
+    from detent.tune.tuned import Tuned
 
 MS = "Largest sensitivity peak, 1.2 to 2.5; the usual 1.7 leaves a gain margin of 2.4 and 34 degrees of phase."
 OVERSHOOT = "Largest peak of the reference to the position without feedforward, at least 1; usually 1.1."
@@ -67,21 +72,28 @@ def tune(
         changes = [one._asdict() for one in found.changes]
         print_json(found.to_dict() | {"changes": changes, "files": [str(path) for path in written]})
     else:
-        say(found.sentence, "bold green" if found.done else "bold yellow")
-        for one in found.refusals:
-            say(f"  {one}", "yellow", wrong=True)
-        print_table("", ("", "before", "after"), found.rows)
-        for told in found.why:
-            say(f"  {told}")
-        for path in written:
-            say(f"written: {path}")
-            if path == write:
-                for change in found.changes:
-                    say(f"  {change}")
-        if found.changes and write is None:
-            say("--write FILE puts the new gains into an axis file")
+        _say_tuned(found, written, write)
     if not found.done:
         raise typer.Exit(NOT_DONE)
+
+
+def _say_tuned(found: "Tuned | Searched", written: Sequence[Path], write: Path | None) -> None:
+    """What was chosen, for people."""
+    say(found.sentence, "bold green" if found.done else "bold yellow")
+    for one in found.refusals:
+        say(f"  {one}", "yellow", wrong=True)
+    print_table("", ("", "before", "after"), found.rows)
+    for told in found.why:
+        say(f"  {told}")
+    if found.table.rows:
+        print_table(*found.table)
+    for path in written:
+        say(f"written: {path}")
+        if path == write:
+            for change in found.changes:
+                say(f"  {change}")
+    if found.changes and write is None:
+        say("--write FILE puts the new gains into an axis file")
 
 
 @app.command()

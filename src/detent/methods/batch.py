@@ -7,6 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.analysis.margins import Margins
+
 Numbers = NDArray[np.float64]
 
 Machine = Callable[[int], Any]
@@ -24,6 +26,13 @@ class Batch(Protocol):
         `variants` gives the values that make the machines, by key: arrays of shape (count,), or one value for all.
         Results by name as `RunRecord.figures` has them, shape (count,), NaN where there is none, and of the cases that
         failed why, by their places.
+        """
+        ...
+
+    def margins(self, variants: Mapping[str, Any], count: int) -> Mapping[str, Margins] | None:
+        """Margins of the loops of each, by the place of the cut: arrays of shape (count,).
+
+        `variants` are of machines that none refuses; None where each is to be looked at for itself.
         """
         ...
 

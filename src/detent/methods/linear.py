@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from detent.analysis.linear_system import LinearSystem, Margins
+from detent.analysis.linear_system import LinearSystem
+from detent.analysis.margins import Margins
 from detent.errors import DetentError
 from detent.files.screen import Block, OnScreen, Screen
 from detent.files.text import check_target, did_you_mean

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.analysis.margins import Margins
 from detent.errors import DetentError, InputError
 from detent.methods.batch import kind_of, refusal_of
 from detent.tune import workers as crew
@@ -87,17 +88,30 @@ def quantities(question: Question) -> tuple[Quantity, ...]:
 def _looked_at(question: Question, spec: Any) -> dict[str, tuple[float, str]]:
     """What an axis is beside its job, where that is asked: margins of its loops where each is cut, and hunting."""
     found = dict[str, tuple[float, str]]()
-    for cut, one in question.method.linear(spec).margins.items() if question.margins else ():
+    if question.margins:
+        found |= _told(question.method.linear(spec).margins)
+    return found | _stood(question, spec)
+
+
+def _told(margins: Mapping[str, Margins]) -> dict[str, tuple[Any, str]]:
+    """Margins as quantities, with their units."""
+    found = dict[str, tuple[Any, str]]()
+    for cut, one in margins.items():
         found[f"Ms at {cut}"] = one.sensitivity, ""
         found[f"phase margin at {cut}"] = one.phase, "rad"
         found[f"gain margin at {cut}"] = one.gain, ""
-    if question.hunt:
-        from detent.tune.standstill import HUNTS as HUNTING
-        from detent.tune.standstill import standstill
-
-        stood = standstill(spec, STARTS, question.seed)
-        found |= {HUNTS: (stood.shares[HUNTING], ""), SWING: (stood.swing, stood.ensemble.unit)}
     return found
+
+
+def _stood(question: Question, spec: Any) -> dict[str, tuple[float, str]]:
+    """What an axis does at standstill, where that is asked."""
+    if not question.hunt:
+        return {}
+    from detent.tune.standstill import HUNTS as HUNTING
+    from detent.tune.standstill import standstill
+
+    stood = standstill(spec, STARTS, question.seed)
+    return {HUNTS: (stood.shares[HUNTING], ""), SWING: (stood.swing, stood.ensemble.unit)}
 
 
 def default_limits(question: Question) -> tuple[Limit, ...]:
@@ -142,13 +156,24 @@ def _looked_at_all(
     question: Question, values: Mapping[str, Numbers], reasons: Mapping[int, str], count: int
 ) -> dict[str, Numbers]:
     """What each machine that did the job is beside it."""
-    found = dict[str, Numbers]()
-    for k in range(count):
-        if k not in reasons:
+    found, good = dict[str, Numbers](), np.array([k for k in range(count) if k not in reasons], np.int64)
+    together = _margins_of(question, {key: each[good] for key, each in values.items()}, len(good))
+    for name, (each, _) in together.items():
+        found.setdefault(name, np.full(count, np.nan))[good] = each
+    if question.hunt or (question.margins and not together):
+        look = _stood if together else _looked_at
+        for k in good.tolist():
             spec = question.machine({key: float(each[k]) for key, each in values.items()}).spec
-            for name, (value, _) in _looked_at(question, spec).items():
+            for name, (value, _) in look(question, spec).items():
                 found.setdefault(name, np.full(count, np.nan))[k] = value
     return found
+
+
+def _margins_of(question: Question, values: Mapping[str, Numbers], count: int) -> dict[str, tuple[Any, str]]:
+    """Margins of machines that nothing refuses, where those of many are found at once."""
+    batch = question.method.batch(question.file.spec, question.job) if question.margins and count else None
+    found = batch.margins(question.variant(values), count) if batch is not None else None
+    return _told(found) if found is not None else {}
 
 
 def make_cases(

@@ -10,6 +10,7 @@ from detent.files.patch import Change, NewValue, patch
 from detent.files.screen import OnScreen
 from detent.files.text import check_target, write_text
 from detent.methods.load import AxisFile
+from detent.page.table import TextTable
 
 
 class Chosen(OnScreen):
@@ -25,6 +26,11 @@ class Chosen(OnScreen):
     def new_values(self) -> Sequence[NewValue]:
         """The values, with what is said of each in the file."""
         raise NotImplementedError
+
+    @property
+    def table(self) -> TextTable:
+        """What the axis does at standstill with friction that its file does not state; no rows where there is none."""
+        return TextTable("", (), ())
 
     @cached_property
     def changes(self) -> list[Change]:

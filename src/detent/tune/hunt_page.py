@@ -13,6 +13,7 @@ from detent.page.parts import Note
 from detent.page.table import Table, TextTable
 from detent.page.units import Units
 from detent.page.words import number
+from detent.tune.assumed import CAPTION
 from detent.tune.dead_band import MAP_STARTS
 from detent.tune.standstill import HUNTS, OUTCOMES
 from detent.units import format_quantity
@@ -156,9 +157,8 @@ def _cobweb(found: "Hunted") -> Figure:
 
 def _assumed(found: "Hunted") -> Figure:
     """What it does with other friction, where the file does not say."""
-    caption = "The file leaves static friction or the Stribeck velocity to their defaults; the verdict depends on them."
     table = found.table.on_page if found.assumed else None
-    return Figure(title=found.table.title, caption=caption, table=table)
+    return Figure(title=found.table.title, caption=CAPTION, table=table)
 
 
 def _widths(found: "Hunted") -> Figure:

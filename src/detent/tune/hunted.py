@@ -1,7 +1,7 @@
 """`detent hunt`: whether an axis hunts at standstill, how far and how often, what stops it, and what that costs."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +19,7 @@ from detent.methods.method import untold
 from detent.methods.registry import METHODS
 from detent.methods.tuning import Ensemble
 from detent.page.table import TextTable
+from detent.tune.assumed import Assumed, as_dicts, as_table, assumed, in_words
 from detent.tune.choice import Progress, value_of
 from detent.tune.dead_band import Band, Map, band_map, least_band
 from detent.tune.standstill import FLICKERS, HUNTS, OPEN, RESTS, Kind, Standstill, standstill
@@ -26,9 +27,7 @@ from detent.units import format_quantity
 
 Numbers = NDArray[np.float64]
 
-RATIOS = 1.0, 1.15, 1.5, 2.0  # static over Coulomb friction that is tried where the file does not say
-SPEEDS = 0.0, 0.3e-3, 1e-3, 3e-3  # Stribeck velocities [m/s]
-TABLE_STARTS = 12
+TABLE_STARTS = 12  # of each friction that is tried where the file does not say
 EARLIER = 2.0  # of a phase before that of rest, which does not last, that is simulated at most [s]
 PLACES = 64  # errors of the return map
 QUICK = 0.05  # period below which a frequency is told [s]
@@ -63,7 +62,7 @@ class Hunted(OnScreen):
     band: Band | None
     map: Map | None
     earlier: tuple[str, Standstill] | None
-    assumed: Sequence[tuple[float, float, Standstill]]
+    assumed: Assumed
 
     @property
     def done(self) -> bool:
@@ -137,12 +136,9 @@ class Hunted(OnScreen):
         if self.band is not None:
             yield self._band_told(self.band)
         if self.assumed:
-            seen = ", ".join(f"{name} in {sum(one.outcome == name for *_, one in self.assumed)}"
-                             for name in (RESTS, OPEN, FLICKERS, HUNTS)
-                             if any(one.outcome == name for *_, one in self.assumed))  # fmt: skip
             yield (
-                "the file does not state static and stribeck everywhere, and the verdict depends on them: of "
-                f"{len(self.assumed)} that may be, it {seen}; record slow moves with reversals (`detent identify`)"
+                "the file does not state static and stribeck everywhere, and the verdict depends on them: "
+                f"{in_words(self.assumed)}; record slow moves with reversals (`detent identify`)"
             )
 
     def _rule_told(self) -> Iterator[str]:
@@ -204,15 +200,7 @@ class Hunted(OnScreen):
     @property
     def table(self) -> TextTable:
         """What the axis does with other friction at standstill."""
-        unit = "rad/s" if self.standing.ensemble.unit == "rad" else "m/s"
-        heads = ("static / Coulomb", *(f"stribeck {format_quantity(speed, unit, 3)}" for speed in SPEEDS))
-        cells = {(ratio, speed): one for ratio, speed, one in self.assumed}
-        ratios = RATIOS if cells else ()
-        rows = [(f"{ratio:g}", *(self._cell(cells[ratio, speed]) for speed in SPEEDS)) for ratio in ratios]
-        return TextTable("Where the file does not say how friction falls", heads, rows)
-
-    def _cell(self, one: Standstill) -> str:
-        return f"{one.outcome} {self.length(one.swing)}" if one.hunts else one.outcome
+        return as_table(self.assumed, self.standing.ensemble.unit)
 
     @cached_property
     def slips(self) -> tuple[Numbers, Numbers] | None:
@@ -292,8 +280,7 @@ class Hunted(OnScreen):
             "forecasts": [asdict(one) for one in self.standing.ensemble.forecasts],
             "cured_on_counts": self.cured, "earlier": None if self.earlier is None else _phase(*self.earlier),
             "dead_band": None if self.band is None else _band(self.band),
-            "assumed": [{"ratio": ratio, "stribeck": speed, "outcome": one.outcome, "swing": one.swing}
-                        for ratio, speed, one in self.assumed],
+            "assumed": as_dicts(self.assumed),
             "map": None if self.map is None else _map(self.map),
         }  # fmt: skip
 
@@ -374,14 +361,8 @@ def hunt(  # noqa: PLR0913 - what may be asked
     if ensemble.earlier is not None:
         name, before = ensemble.earlier
         earlier = name, standstill(before, starts, seed, longest=EARLIER, progress=_part(told, 0.3, 0.6))
-    assumed = list[tuple[float, float, Standstill]]()
-    if not ensemble.stated:
-        for ratio in RATIOS:
-            for speed in SPEEDS:
-                told(0.6 + 0.1 * len(assumed) / 16, f"static friction {ratio:g} times Coulomb friction")
-                tried = standstill(ensemble.assumed(ratio, speed), TABLE_STARTS, seed, on_counts=on_counts)
-                assumed.append((ratio, speed, tried))
+    other = assumed(ensemble, seed, TABLE_STARTS, _part(told, 0.6, 0.7), on_counts=on_counts)
     if map_it:
         gain = value_of(spec, ensemble.integral)
         made = band_map(spec, found, gain, _part(told, 0.7, 0.95))
-    return Hunted(file, found, cured, band, made, earlier, assumed)
+    return Hunted(file, found, cured, band, made, earlier, other)

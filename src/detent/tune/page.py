@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from detent.analysis.linear_system import LinearSystem, Margins
+from detent.analysis.linear_system import LinearSystem
+from detent.analysis.margins import Margins
 from detent.axisfile.tables import AxisSpec
 from detent.methods.registry import METHODS
 from detent.methods.tuning import Response
@@ -17,6 +18,7 @@ from detent.page.parts import Note, Numbers
 from detent.page.table import TextTable
 from detent.page.units import Units
 from detent.page.words import number
+from detent.tune.assumed import CAPTION
 from detent.units import format_quantity
 
 if TYPE_CHECKING:
@@ -35,7 +37,7 @@ def tuned_page(found: "Tuned") -> Page:
     """Put the page together."""
     level = "good" if found.done else "warn" if found.after else "bad"
     verdict = {"good": "Gains chosen", "warn": "For the nominal axis only", "bad": "No gains"}[level]
-    sections = [Section("Before and after", [_table(found), _why(found)])]
+    sections = [Section("Before and after", [_table(found), _why(found), *_friction(found)])]
     sections += [
         Section("The loops", _loops(found)), Section("In time", _in_time(found)),
         Section("What more would cost", [*_trade(found), _further(found)]),
@@ -84,6 +86,13 @@ def _why(found: "Tuned") -> Figure:
     """What decided, a sentence a row."""
     rows = [(one.replace("`", ""),) for one in found.why]
     return Figure(title="Why these gains", table=TextTable("", ("",), rows).on_page if rows else None)
+
+
+def _friction(found: "Tuned") -> list[Figure]:
+    """What it does at standstill with friction that the file does not state."""
+    if not found.assumed:
+        return []
+    return [Figure(title=found.table.title, caption=CAPTION, table=found.table.on_page)]
 
 
 def _systems(found: "Tuned", spec: AxisSpec) -> dict[str, LinearSystem]:

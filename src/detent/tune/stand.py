@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from detent.analysis.linear_system import Margins
+from detent.analysis.margins import Margins
 from detent.files.findings import Caution, Derived
 from detent.kernel.step import config
 from detent.methods.check import check_spec

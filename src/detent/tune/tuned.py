@@ -20,6 +20,8 @@ from detent.methods.load import AxisFile
 from detent.methods.method import untold
 from detent.methods.registry import METHODS
 from detent.methods.tuning import Bounds, Share
+from detent.page.table import TextTable
+from detent.tune.assumed import Assumed, as_dicts, as_table, assumed, in_words
 from detent.tune.choice import FEWEST, Chooser, Guaranteed, Progress, value_of
 from detent.tune.chosen import Chosen
 from detent.tune.dead_band import Cure, cures
@@ -28,6 +30,7 @@ from detent.tune.stand import Stand, at_rest
 from detent.tune.standstill import Standstill, standstill
 from detent.units import format_quantity
 
+SEED, TABLE_STARTS = 1, 6  # of the starts at standstill; so many of each friction that the file leaves open
 SAME = 1e-12  # of a gain, as a share
 TRADED = (1.3, 1.4, 1.5, 1.6, 1.7, 1.85, 2.0, 2.2)  # values of Ms of which a report tells what they would give
 MOST_LIMITED = 0.05  # share of the job with the command at its limit
@@ -69,6 +72,9 @@ class Tuned(Chosen):
         What stops the hunting of these gains, that with the smaller rest error first: it is among `values`.
     hunted : Standstill or None
         How they hunt without it.
+    assumed : sequence
+        What the axis with these values does at standstill with other static friction, over Coulomb friction, and
+        Stribeck velocity [m/s], where the file does not state them; as `Hunted.assumed`.
     """
 
     before: Stand
@@ -85,6 +91,7 @@ class Tuned(Chosen):
     further: Sequence[tuple[str, float]]
     cures: Sequence[Cure]
     hunted: Standstill | None
+    assumed: Assumed
     chooser: Chooser = field(compare=False)
 
     @property
@@ -124,23 +131,33 @@ class Tuned(Chosen):
         return told
 
     def _at_standstill(self) -> Iterator[str]:
-        """How it hunts, and what was done about it."""
-        if self.hunted is None:
-            return
-        unit, stops = self.hunted.ensemble.unit, list[str]()
+        """How it hunts, what was done about it, and what it depends on."""
+        if self.hunted is not None:
+            yield self._stopped(self.hunted)
+        if self.assumed:
+            yield (
+                "At standstill much depends on static friction and Stribeck velocity, which the file does not state "
+                f"everywhere: with these values, {in_words(self.assumed)}, from {TABLE_STARTS} starts each; slow "
+                "moves with reversals, recorded, tell which it is (`detent identify`)."
+            )
+
+    @property
+    def table(self) -> TextTable:
+        """What the axis does with other friction at standstill; no rows where the file states it."""
+        unit = self.after.stood.ensemble.unit if self.after and self.after.stood else "m"
+        return as_table(self.assumed, unit)
+
+    def _stopped(self, hunted: Standstill) -> str:
+        """How it hunts, and what stops it."""
+        unit, stops = hunted.ensemble.unit, list[str]()
         fields = {dotted(path): field for path, field, _ in held_leaves(self.file.spec)}
         for one in self.cures:
             text = f"{one.name}, {one.key} {format_value(fields[one.key], one.value)}"
             stops.append(f"{text}, with which it rests up to {format_quantity(one.rest_error, unit, 3)} off")
-        told = f"At standstill these gains would have it go to and fro for ever: it {at_rest(self.hunted)}."
+        told = f"At standstill these gains would have it go to and fro for ever: it {at_rest(hunted)}."
         none = "Neither a dead band within method.in_position nor less integral stops it; see `detent hunt`."
-        none = none if self.hunted.ensemble.band else "See `detent hunt`."
-        yield f"{told} What stops it: {', or '.join(stops)}; the first is chosen." if stops else f"{told} {none}"
-        if not self.hunted.ensemble.stated:
-            yield (
-                "That depends on static friction and Stribeck velocity, which the file does not state: `detent hunt` "
-                "has a table of what it does with others; slow moves with reversals, recorded, tell which it is."
-            )
+        none = none if hunted.ensemble.band else "See `detent hunt`."
+        return f"{told} What stops it: {', or '.join(stops)}; the first is chosen." if stops else f"{told} {none}"
 
     @cached_property
     def trade(self) -> list[tuple[float, float]]:
@@ -224,7 +241,9 @@ class Tuned(Chosen):
     def screen(self) -> Screen:
         """Gains and figures before and after, and why not."""
         title = "\n".join([self.sentence, self.before.file.file, *map(str, self.refusals)])
-        return Screen(title, [Block("", ("", "before", "after"), self.rows, 30)], ".save(FILE)  .report(FILE)")
+        blocks = [Block("", ("", "before", "after"), self.rows, 30)]
+        blocks += [Block(*self.table)] if self.assumed else []
+        return Screen(title, blocks, ".save(FILE)  .report(FILE)")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as ``--json`` prints it."""
@@ -252,7 +271,7 @@ class Tuned(Chosen):
             "shares": {one.key: one.why for one in self.shares},
             "limited": self.limited,
             "further": {text: times if math.isfinite(times) else None for text, times in self.further},
-            "cures": [vars_of(one, CURE) for one in self.cures],
+            "cures": [vars_of(one, CURE) for one in self.cures], "assumed": as_dicts(self.assumed),
             "before": stand(self.before), "after": stand(self.after),
         }  # fmt: skip
 
@@ -307,11 +326,12 @@ def tune(  # noqa: PLR0913 - what may be asked
     if after is not None and not refusals:
         others = (method.run(one.spec.varied(chosen), job) for one in found.binding[1:])
         refusals = list(_saturated([after.result, *others]))
+    other = _assumed(after, lambda at, text: progress(0.95 + 0.05 * at, text))
     limited = chooser.limits(kept) if kept.values else ""
     told = [one for one in shares if one.key not in hold]
     return Tuned(
         before, after, bounds, chooser.goal, chosen, worth, tuning.worth_text, found, refusals, told, limited, further,
-        stops, hunted, chooser,
+        stops, hunted, other, chooser,
     )  # fmt: skip
 
 
@@ -322,6 +342,13 @@ def _stopped(after: Stand | None, hold: Sequence[str], progress: Progress) -> tu
     spec = after.file.spec
     found = standstill(spec, after.stood.ensemble.usual)
     return found, cures(spec, found, hold, progress)
+
+
+def _assumed(after: Stand | None, progress: Progress) -> Assumed:
+    """What the axis with its new gains does with friction that its file does not state."""
+    if after is None or after.stood is None:
+        return ()
+    return assumed(after.stood.ensemble, SEED, TABLE_STARTS, progress)
 
 
 def _unsure(spec: AxisSpec, key: str, one: Tolerance) -> float:

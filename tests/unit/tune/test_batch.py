@@ -3,10 +3,11 @@
 import math
 import pickle
 
+import numpy as np
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.standstill_rig import RIGID, rigid
-from tests.tolerance_rig import asked, quick
+from tests.tolerance_rig import FORCE_PID, SLIDE, asked, quick
 
 import detent
 from detent.methods.batch import kind_of
@@ -86,6 +87,31 @@ def test_margins_are_quantities_where_they_are_asked_for(tmp_path):
     values = {key: float(each[1]) for key, each in chunk.values.items()}
     margins = question.method.linear(question.machine(values).spec).margins["command"]
     assert chunk.results["Ms at command"][1] == margins.sensitivity != chunk.results["Ms at command"][0]
+
+
+MANY = SLIDE + '"drive.delay" = [0, 2]\n"method.velocity_gain" = "20 %"\n'
+FEEDBACKS = [
+    pytest.param("", id="motor"),
+    pytest.param('"method.derivative" = "10 %"\n', id="pid"),
+    pytest.param('"method.derivative_filter" = ["0 ms", "0.3 ms"]\n', id="not in columns"),
+]
+
+
+@pytest.mark.parametrize("more", FEEDBACKS)
+def test_margins_of_many_are_those_of_each_in_whatever_pieces(tmp_path, more):
+    text = quick(FORCE_PID) if more else quick()
+    table = '\n[tolerance]\n"mechanics.load_mass" = "20 %"\n"drive.delay" = [0, 2]\n' + more if more else MANY
+    question = asked(tmp_path, table, one_move("none", 0.0, 0.0), text, margins=True)
+    count = 40
+    chunk = run_chunk(question, 0, count)
+    parts = [run_chunk(question, first, n) for first, n in ((0, 1), (1, 2), (3, 30), (33, 7))]
+    for name, each in chunk.results.items():
+        assert np.array_equal(np.concatenate([part.results[name] for part in parts]), each, equal_nan=True), name
+    for k in range(0, count, 7):
+        spec = question.machine({key: float(each[k]) for key, each in chunk.values.items()}).spec
+        for cut, m in question.method.linear(spec).margins.items():
+            for name, value in (("Ms", m.sensitivity), ("phase margin", m.phase), ("gain margin", m.gain)):
+                assert chunk.results[f"{name} at {cut}"][k] == pytest.approx(value, rel=1e-9)
 
 
 @pytest.mark.compiled

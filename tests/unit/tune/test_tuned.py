@@ -180,8 +180,10 @@ def test_gains_that_hunt_are_told_so_with_what_stops_it_and_what_it_depends_on()
     last = told.why[-2:]
     assert "a dead band, method.dead_band" in last[0]
     assert "or no integral" in last[0]
-    assert "`detent hunt` has a table" in last[1]
+    assert "of 16 that may be, it " in last[1]
     assert "does not state" in last[1]  # of the load, whose static friction is a default
+    assert len(told.table.rows) == 4
+    assert len(told.to_dict()["assumed"]) == 16
     assert told.to_dict()["cures"][0] == {
         "key": band.key, "value": band.value, "name": "a dead band", "rest_error": band.rest_error
     }  # fmt: skip

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.analysis.margins import Margins
 from detent.control.guard import NO_ARRIVAL, await_arrival
 from detent.errors import GUARD_TEXT, InputError
 from detent.files.fields import BOUNDS, bounds_of, leaf_fields
@@ -25,7 +26,7 @@ from detent.methods.batch import Machine, Numbers, kind_of, refusal_of
 from detent.methods.cascade import checks
 from detent.methods.cascade.build import build_cascade, fill_cascade, motion_limits
 from detent.methods.cascade.controller import ARRIVED, FAULT, Feed
-from detent.methods.cascade.loop import machine_of
+from detent.methods.cascade.loop import LinearLoop, machine_of
 from detent.methods.cascade.run import CascadeRun, check_cascade_job
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, FeedModelTable
 from detent.methods.cascade.system import Cascade, CascadeParams, along, switch_on
@@ -341,9 +342,7 @@ class CascadeBatch:
 
     def fleet(self, variants: Mapping[str, Any], machine: Machine, count: int) -> _Fleet:
         """The axes; those that their file would be refused are there, too, and make no move."""
-        fields = {dotted(path) for path, _ in leaf_fields(type(self.spec))}
-        alone = [key for key, column in variants.items() if np.ndim(column) and key not in COLUMNS]
-        if alone or not fields.issuperset(variants):
+        if not self._in_columns(variants):
             return self._each(machine, count)
         params = build_many(self.spec, variants, count)
         fleet = _Fleet([self.spec], np.zeros(count, np.int64), params)
@@ -353,6 +352,12 @@ class CascadeBatch:
             except InputError as error:
                 fleet.refuse(k, refusal_of(error.problems))
         return fleet
+
+    def _in_columns(self, variants: Mapping[str, Any]) -> bool:
+        """Whether these machines can be built as columns."""
+        fields = {dotted(path) for path, _ in leaf_fields(type(self.spec))}
+        alone = [key for key, column in variants.items() if np.ndim(column) and key not in COLUMNS]
+        return not alone and fields.issuperset(variants)
 
     def _each(self, machine: Machine, count: int) -> _Fleet:
         """Axes built one by one."""
@@ -377,3 +382,7 @@ class CascadeBatch:
         fleet = self.fleet(variants, machine, count)
         fleet.run(self.job)
         return fleet.results(), fleet.reasons
+
+    def margins(self, variants: Mapping[str, Any], count: int) -> Mapping[str, Margins] | None:
+        """Margins of the loops of each; as `methods.batch.Batch` says it."""
+        return LinearLoop(self.spec.varied(variants), count).margins if self._in_columns(variants) else None

@@ -15,7 +15,6 @@ hangs does so near its lowest place.
 
 import math
 from functools import cached_property, partial
-from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -23,14 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.analysis.count_edge import EdgeCycle, edge_cycle
-from detent.analysis.linear_system import (
-    LinearSystem,
-    Margins,
-    gain_limit,
-    largest_level,
-    margins_of,
-    usual_frequencies,
-)
+from detent.analysis.linear_system import LinearSystem, gain_limit
+from detent.analysis.margins import Margins, Places, around, margins_of, one_of
+from detent.analysis.sampled_plant import Fraction, fraction, held, polynomial, times
+from detent.axisfile.elementwise import is_array, least
 from detent.methods.cascade.schema import CascadeSpec, EncoderTable
 from detent.plant.linear_two_mass import linear_plant
 
@@ -39,7 +34,6 @@ Phasors = NDArray[np.complex128]
 
 LARGEST_MARGIN = 1e3  # largest gain margin that is looked for
 SWINGING = 1.0 - 1e-3  # of the largest factor of a mode: those that neither decay nor grow at the gain margin
-WELL_APART = 1e8  # condition of the modes up to which responses are sums over them
 
 
 def machine_of(spec: CascadeSpec) -> Any:
@@ -73,13 +67,17 @@ class LimitCycle(NamedTuple):
 
 
 class LinearLoop:
-    """The closed loop."""
+    """The closed loop.
 
-    def __init__(self, spec: CascadeSpec) -> None:
-        self.spec = spec
+    Of many axes of one file, whose values are arrays of shape (n,), it has plants, responses and margins; its matrices
+    are those of one.
+    """
+
+    def __init__(self, spec: CascadeSpec, count: int = 0) -> None:
+        self.spec, self.count = spec, count  # 0: one axis
         self.period = spec.method.sample_period
         frictions = (spec.mechanics.friction, spec.mechanics.load_friction)
-        drags = [min(f.positive.viscous, f.negative.viscous) for f in frictions]
+        drags = [least(f.positive.viscous, f.negative.viscous) for f in frictions]
         self.plant = linear_plant(machine_of(spec), (drags[0], drags[1]))
         self.gain = spec.drive.voltage_gain if spec.drive.input == "voltage" else spec.effort_per_command
         # Encoders of both loops, and the places of the positions that they read.
@@ -90,32 +88,50 @@ class LinearLoop:
         # Shares of a new velocity, and of a new velocity error of a PID, that their filters take over.
         self.velocity_share = smoothing(self.velocity_sensor.velocity_filter, self.period)
         self.derivative_share = smoothing(spec.method.derivative_filter, self.period)
-        self.frequencies = usual_frequencies(self.period)  # of the open loops [Hz]
 
     @cached_property
+    def margins(self) -> dict[str, Margins]:
+        """Margins by the place of the cut; of many axes arrays of shape (n,)."""
+        near = np.broadcast_to(self._resonances, (self.count or 1, self._resonances.shape[-1]))
+        found = margins_of(self._cut_everywhere, near, self.period)
+        return dict(zip(self.cuts, found if self.count else map(one_of, found), strict=True))
+
+    @property
     def velocity_loop(self) -> Margins:
         """Margins of the velocity loop; a PID has none, which then never crosses a gain of 1."""
-        return margins_of(lambda at: self._open_loops(at)[0], self.frequencies, self.period)
+        return self.margins.get("velocity", Margins(0.0, math.pi, math.inf, math.inf, 1.0, 0.0))
 
-    @cached_property
+    @property
     def position_loop(self) -> Margins:
         """Margins of the position loop around it; of a PID, of its only loop."""
-        return margins_of(lambda at: self._open_loops(at)[1], self.frequencies, self.period)
+        return self.margins[self.cuts[-1]]
 
-    @cached_property
+    @property
     def sensitivity(self) -> tuple[float, float]:
         """Ms at the command, largest magnitude of 1/(1 + L) where the amplifier sees both loops, and where [Hz]."""
+        return self.margins["command"].sensitivity, self.margins["command"].peak
 
-        def level(at: Numbers) -> Numbers:
-            inner, outer = self._open_loops(at)
-            return 1.0 / np.maximum(np.abs((1.0 + inner) * (1.0 + outer)), 1e-300)
+    @cached_property
+    def _resonances(self) -> Numbers:
+        """Frequencies inside the resonances of the plants [Hz], shape (k,) or (n, k)."""
+        modes = np.linalg.eigvals(self.plant.a)
+        hangs = is_array(self.spec.mechanics.pendulum) or self.spec.mechanics.pendulum > 0.0
+        pairs = (modes.shape[-1] - (not hangs)) // 2  # a place that nothing pulls is no part of one
+        order = np.argsort(-modes.imag, axis=-1, kind="stable")[..., :pairs]
+        return around(np.take_along_axis(modes, order, axis=-1).astype(np.complex128), self.period)
 
-        return largest_level(level, self.open_loop("command").frequencies())
+    def _cut_everywhere(self, frequencies: Numbers, which: Places) -> Phasors:
+        """The open loops of some axes at frequencies [Hz], in the order of `cuts`."""
+        inner, outer = self._open_loops(frequencies, which)
+        each = (self._at_cut(cut, inner, outer) for cut in self.cuts)
+        return np.stack([np.broadcast_to(one, (len(which), one.shape[-1])) for one in each])
 
     @cached_property
     def held(self) -> tuple[Numbers, Numbers]:
         """Ad and Bd: the plant from sample to sample."""
-        return self._held(self.plant.b)
+        moved, driven = self._held
+        apart, together = self._apart
+        return np.eye(len(driven)) + times(times(together, moved), apart), together @ driven
 
     @cached_property
     def loaded(self) -> Numbers:
@@ -123,15 +139,32 @@ class LinearLoop:
         force = np.zeros_like(self.plant.b)
         coupled = self.plant.load != self.plant.motor
         force[self.plant.load + 1] = 1.0 / (self.spec.mechanics.load_mass if coupled else self.spec.mass)
-        return self._held(force)[1]
+        return self._apart[1] @ self._moved(force)[1]
 
-    def _held(self, driven: Numbers) -> tuple[Numbers, Numbers]:
-        expm: Any = import_module("scipy.linalg").expm
-        size = len(driven)
-        a = np.zeros((size + 1, size + 1))
-        a[:size, :size], a[:size, size] = self.plant.a, driven
-        whole = expm(a * self.period)
-        return whole[:size, :size], whole[:size, size]
+    @cached_property
+    def _held(self) -> tuple[Numbers, Numbers]:
+        """The same in the coordinates of `_apart`, without the part that stays."""
+        return self._moved(self.plant.b)
+
+    def _moved(self, driven: Numbers) -> tuple[Numbers, Numbers]:
+        apart, together = self._apart
+        a = times(times(apart, self.plant.a), together)
+        return held(a, times(apart, driven[..., None])[..., 0], self.period)
+
+    @cached_property
+    def _apart(self) -> tuple[Numbers, Numbers]:
+        """From the state to one with the load's place over the motor's, and back; all but places per sample, or so.
+
+        Whatever the coupling, a place that nothing pulls then acts on nothing, to the last bit.
+        """
+        motor, load = self.plant.motor, self.plant.load
+        apart = np.eye(self.plant.b.shape[-1])
+        together = apart.copy()
+        if load != motor:
+            apart[[load, load + 1], [motor, motor + 1]], together[[load, load + 1], [motor, motor + 1]] = -1.0, 1.0
+        scale = np.full(len(apart), 2.0 ** round(math.log2(self.period)))
+        scale[[motor, load]] = 1.0
+        return scale[:, None] * apart, together / scale
 
     @cached_property
     def sensors(self) -> dict[str, EncoderTable]:
@@ -157,13 +190,18 @@ class LinearLoop:
         """The loop that is cut open at a place, as matrices."""
         after, out = self._sample(cut)
         a, b, c, d = after[:, :-1], after[:, -1:], out[None, :-1], out[None, -1:]
-        quick = partial(self._cut_open, cut) if cut in self.cuts else None
-        return LinearSystem(a=a, b=b, c=c, d=d, dt=self.period, name=f"{cut} loop", quick=quick)
+        quick, known = None, None
+        if cut in self.cuts:
+            quick, known = partial(self._cut_open, cut), lambda: self.margins[cut]
+        return LinearSystem(a=a, b=b, c=c, d=d, dt=self.period, name=f"{cut} loop", quick=quick, known=known)
 
     def _cut_open(self, cut: str, frequencies: Numbers) -> Phasors:
-        """The same at frequencies [Hz], as a sum over the modes of the plant."""
-        inner, outer = self._open_loops(frequencies)
-        return {"velocity": inner, "position": outer}.get(cut, inner + outer * (1.0 + inner))
+        """The same at frequencies [Hz], from the response of the plant."""
+        return self._at_cut(cut, *self._open_loops(frequencies))
+
+    def _at_cut(self, cut: str, inner: Phasors, outer: Phasors) -> Phasors:
+        """One of both loops; at the command both."""
+        return {"velocity": inner, "position": outer}.get(cut, inner + _product(outer, 1.0 + inner))
 
     @property
     def edge(self) -> EdgeCycle | None:
@@ -260,53 +298,57 @@ class LinearLoop:
         places = states[[self.plant.motor, self.plant.load]]
         return LimitCycle(frequency / (math.tau * self.period), *(2.0 * places).tolist())
 
-    def _open_loops(self, frequencies: Numbers) -> tuple[Phasors, Phasors]:
+    def _open_loops(self, frequencies: Numbers, which: Places | None = None) -> tuple[Phasors, Phasors]:
         """Velocity loop, and position loop with that inside it closed; of a PID no velocity loop, and all of it."""
-        m, (position, velocity, summed) = self.spec.method, self.paths(frequencies)
+        m, (position, velocity, summed) = self.spec.method, self.paths(frequencies, which)
         if m.structure == "pid":
-            return np.zeros_like(position), (m.proportional + m.integral * summed) * position + m.derivative * velocity
-        law = m.velocity_gain + m.velocity_integral * summed
-        return law * velocity, m.position_gain * law * position / (1.0 + law * velocity)
+            law = _of(m.proportional, which) + _of(m.integral, which) * summed
+            return np.zeros_like(position), _product(law, position) + _of(m.derivative, which) * velocity
+        law = _of(m.velocity_gain, which) + _of(m.velocity_integral, which) * summed
+        inner = _product(law, velocity)
+        return inner, _of(m.position_gain, which) * _product(law, position) / (1.0 + inner)
 
-    def paths(self, frequencies: Numbers) -> tuple[Phasors, Phasors, Phasors]:
+    def paths(self, frequencies: Numbers, which: Places | None = None) -> tuple[Phasors, Phasors, Phasors]:
         """What the gains stand between, at frequencies [Hz]: from a command to the position and to the velocity.
 
         Both as they are read; the velocity of a PID behind its derivative's filter. Third, the sum of an integral.
+        Of many axes those `which` are asked for, shape (n,), at frequencies of shape (k,) or (n, k).
         """
-        read, z = self.velocity_sensor, np.exp(2j * np.pi * frequencies * self.period)
-        span, late = float(read.velocity_span), self.gain * z ** -float(self.spec.drive.delay)
-        position, velocity = self._driven(z)
-        position = late * position * z ** -float(self.position_sensor.delay)
-        velocity = late * velocity * z ** -float(read.delay) * (1 - z**-span) / (span * self.period)
-        velocity = velocity * _filter(z, self.velocity_share)
+        read, half = self.velocity_sensor, np.pi * self.period * frequencies
+        sine, cosine = np.sin(half), np.cos(half)
+        less = _phasors(-2.0 * sine * sine, 2.0 * sine * cosine)  # z - 1, though z be near 1
+        places, shared = self._driven(less, which), self.position_sensor is self.velocity_sensor
+        late = _delay(half, self.spec.drive.delay, which)
+        at = _product(late, _delay(half, self.position_sensor.delay, which))
+        position = _of(self.gain, which) * _product(at, places[0])
+        same = shared and self.position_place == self.velocity_place
+        if not same:
+            at = _product(late, _delay(half, read.delay, which))
+        span = read.velocity_span
+        difference = (1.0 - _delay(half, span, which)) / (span * self.period)
+        speed = _product(difference, _filter(less, self.velocity_share))
         if self.spec.method.structure == "pid":
-            velocity = velocity * _filter(z, self.derivative_share)
-        summed: Any = self.period * z / (z - 1.0)
-        return position, velocity, summed
+            speed = _product(speed, _filter(less, self.derivative_share))
+        if same:
+            return position, _product(position, speed), self.period * (1.0 + less) / less
+        velocity = _of(self.gain, which) * _product(_product(at, speed), places[-1])
+        return position, velocity, self.period * (1.0 + less) / less
 
-    def _driven(self, z: Phasors) -> tuple[Phasors, Phasors]:
-        """Both positions of the plant that are read, to what the amplifier puts out; by its modes where they differ."""
-        held, driven = self.held
-        places = [self.position_place, self.velocity_place]
-        modes, shares = self._modes
-        if shares is not None:
-            found: Any = (1.0 / (z[:, None] - modes)) @ shares.T
-        else:  # without drag the position sums up what is summed up already
-            through = z[:, None, None] * np.eye(len(driven)) - held
-            put_in = np.broadcast_to(driven[:, None], (len(z), len(driven), 1)).astype(np.complex128)
-            found = np.linalg.solve(through, put_in)[:, places, 0]
-        return found[:, 0], found[:, 1]
+    def _driven(self, less: Phasors, which: Places | None) -> list[Phasors]:
+        """The positions of the plant that are read, to what the amplifier puts out; one where they are the same."""
+        above, below = (one if which is None or one.ndim == each else one[which]
+                        for one, each in zip(self._fraction, (2, 1), strict=True))  # fmt: skip
+        powers = [np.ones_like(less), less]
+        while len(powers) < below.shape[-1]:
+            powers.append(powers[-1] * less)
+        divided = 1.0 / polynomial(below, powers)
+        return [_product(polynomial(above[..., k, :], powers), divided) for k in range(above.shape[-2])]
 
     @cached_property
-    def _modes(self) -> tuple[Phasors, Phasors | None]:
-        """Modes of the plant from sample to sample, and their shares in both places that are read; None if alike."""
-        held, driven = self.held
-        modes, vectors = np.linalg.eig(held)
-        if np.linalg.cond(vectors) >= WELL_APART:
-            return modes, None
-        places = [self.position_place, self.velocity_place]
-        shares: Any = vectors[places] * np.linalg.solve(vectors, driven.astype(np.complex128))
-        return modes, shares
+    def _fraction(self) -> Fraction:
+        """The same as polynomials."""
+        places = dict.fromkeys((self.position_place, self.velocity_place))
+        return fraction(*self._held, self._apart[1][list(places)])
 
     def velocity_level(self, frequency: float) -> float:
         """Gain of the open velocity loop at a frequency [Hz] below half the sample rate."""
@@ -318,9 +360,31 @@ def smoothing(time_constant: float, period: float) -> float:
     return -math.expm1(-period / time_constant) if time_constant > 0.0 else 1.0
 
 
-def _filter(z: Phasors, share: float) -> Phasors:
-    """Response of the first-order filter."""
-    return share / (1.0 - (1.0 - share) / z)
+def _filter(less: Phasors, share: float) -> Phasors:
+    """Response of the first-order filter to z - 1."""
+    return share * (1.0 + less) / (less + share)
+
+
+def _product(first: Phasors, second: Phasors) -> Phasors:
+    """Of two that have a name: NumPy multiplies by a large one that has none in place, which rounds another way."""
+    return first * second
+
+
+def _phasors(real: Numbers, imaginary: Numbers) -> Phasors:
+    found = np.empty(real.shape, np.complex128)
+    found.real, found.imag = real, imaginary
+    return found
+
+
+def _delay(half: Numbers, samples: Any, which: Places | None) -> Phasors:
+    """Response of a dead time, to half the angle that a sample is."""
+    angle = -2.0 * _of(samples, which) * half
+    return _phasors(np.cos(angle), np.sin(angle))
+
+
+def _of(value: Any, which: Places | None) -> Any:
+    """A value of some axes, to be put beside frequencies."""
+    return value[which][:, None] if which is not None and is_array(value) else value
 
 
 def _radius(transition: Numbers) -> float:

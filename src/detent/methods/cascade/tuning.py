@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.analysis.linear_system import largest_level
+from detent.analysis.margins import largest_level
 from detent.methods.cascade.checks import LARGEST_JUMP, directions
 from detent.methods.cascade.derive import CascadeFigures
 from detent.methods.cascade.schema import CascadeSpec
