@@ -92,10 +92,10 @@ WHOLE_HELPERS = {
     "max_f8": "double N(max_f8)(double a, double b)\n{\n    return (b > a) ? b : a;\n}\n",
     "to_i64": """int64_t N(to_i64)(double x)
 {
-    if (x >= 9223372036854775808.0) {
-        return INT64_MAX;
+    if (fabs(x) < 9223372036854775808.0) {
+        return (int64_t)x;
     }
-    return (x >= -9223372036854775808.0) ? (int64_t)x : ((-INT64_MAX) - 1);
+    return (x > 0.0) ? INT64_MAX : ((-INT64_MAX) - 1);
 }
 """,
     "shift_right_i64": """int64_t N(shift_right_i64)(int64_t a, unsigned n) /* shorter than by its sign */
@@ -292,7 +292,7 @@ def code_text(program: Program) -> str:
     constants = "".join(f"#define {name} {text}\n" for name, (_, text) in sorted(program.notes.constants.items()))
     functions = "\n".join(program.texts[f.py] for f in program.order)
     body = "\n".join(part for part in (constants, helpers_text(program), functions) if part)
-    needs_math = any(word in functions for word in ("sqrt(", "fabs(", "INFINITY"))
+    needs_math = any(word in body for word in ("sqrt(", "fabs(", "INFINITY"))
     includes = ["<math.h>"] if needs_math else []
     includes += ["<stddef.h>"] if "NULL" in functions else []
     includes += ["<string.h>"] if "memcpy(" in body else []
