@@ -10,7 +10,7 @@ Salmon, Moraes, Dror, Shaw: Parallel random numbers: as easy as 1, 2, 3. SC11.
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, is_dataclass, replace
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from functools import cached_property, lru_cache
 from importlib import import_module
 from typing import Any, cast
@@ -60,7 +60,7 @@ class Question:
     text: str  # of the file
     overrides: tuple[str, ...]  # values of ``--set``
     changes: tuple[tuple[str, Any], ...]  # values of a program over those of the file, by dotted key
-    job: Any  # as the method reads it
+    job: Any = field(hash=False)  # as the method reads it, which may hold tables
     tolerance: tuple[Tolerance, ...]  # what is not known, in the order of the file
     seed: int = 1  # 0 to 2**64 - 1
     limits: tuple[Limit, ...] = ()  # what passes

@@ -153,7 +153,7 @@ def _scatter(found: "Tolerated", name: str) -> Figure:
         if which.any()
     ]
     panel = Panel(name="scatter", label=y_label, curves=curves, height=300)
-    caption = f"Each ring is a machine, by the two keys that explain most of {name}."
+    caption = f"Each point is a machine, by the two keys that explain most of {name}."
     return Figure(
         title="Where the bad ones lie" if len(bad) else "The two keys that decide most",
         caption=caption,
@@ -186,10 +186,11 @@ def _spread(found: "Tolerated", one: Quantity) -> Figure:
         zip(map(float, shown[len(seen) :]), [*("limit" for _ in near), *("worst case" for _ in worst)], strict=True)
     )
     chart: Chart = spread_chart(f"spread-{one.name.replace(' ', '-')}", shown[: len(seen)], (label, "cases"), marks)
-    low, high, most, nominal = (
-        format_quantity(value, one.unit, 3) for value in (figure.low, figure.high, figure.most, figure.nominal)
+    low, high, least, most, nominal = (
+        format_quantity(value, one.unit, 3)
+        for value in (figure.low, figure.high, figure.least, figure.most, figure.nominal)
     )
-    caption = f"90 % of all lie between {low} and {high}; the largest is {most}, that of the file {nominal}."
+    caption = f"90 % lie between {low} and {high}, all between {least} and {most}; the file itself has {nominal}."
     caption += f" The worst machine found has {format_quantity(worst[0], one.unit, 3)}." if worst else ""
     far = [format_quantity(limit.value, one.unit, 3) for limit in limits if limit not in near]
     caption += f" The limit, {' and '.join(far)}, is far away." if far else ""

@@ -141,10 +141,11 @@ class Tolerated(OnScreen):
         """Tables for a terminal."""
         yields = [(one.name, f"{one.good} of {one.of}", str(one)) for one in self.yields]
         failures = [(one.kind, f"{one.number}", ", ".join(map(str, one.cases))) for one in self.judged.failures]
+        causes = ("", "key", "share", "rank", *(["total"] if self.total else []))
         return [
             Block("", ("passes", "cases", "yield, 95 % interval"), yields),
             Block("", ("", "nominal", "mean", "5 %", "95 %", "largest"), self.quantity_rows, 14),
-            Block(CAUSES, ("", "key", "share", "rank", *(["total"] if self.total else [])), self.cause_rows, 12),
+            *([Block(CAUSES, causes, self.cause_rows, 12)] if self.cause_rows else []),
             *([Block("The worst machine found", ("", "sample", "worst"), self.worst_rows, 12)] if self.worst else []),
             *([Block("Why cases fail", ("", "cases", "the first"), failures, 6)] if failures else []),
         ]

@@ -55,7 +55,7 @@ def worst(
     fail have no figures and are passed over.
 
     Without names, of every quantity of the whole job; one that no case of the sample has is left out. The smallest is
-    the worst where a limit of the question says so.
+    the worst where a limit of the question says so, or the quantity its name: `least_margin`.
     """
     chunks = list(chunks)
     known = [one.name for one in quantities(question)]
@@ -65,6 +65,7 @@ def worst(
         if name not in known:
             raise DetentError(f"worst: got {name!r}; expected: one of {', '.join(known)}; name one of these")
     least = {limit.quantity for limit in question.limits if limit.least}
+    least.update(name for name in names if name.startswith("least_"))
     values = {key: np.concatenate([one.values[key] for one in chunks]) for key in chunks[0].values}
     numbers = np.concatenate([np.arange(one.first, one.first + one.count) for one in chunks])
     found = list[Worst]()

@@ -69,6 +69,34 @@ def test_the_command_says_how_many_pass_and_continues_its_store(file, tmp_path):
 
 
 @pytest.mark.compiled
+@pytest.mark.wide
+@pytest.mark.parametrize(
+    ("name", "job", "line"),
+    [
+        ("filtered_servo", "slide_moves.toml", '"mechanics.moving_mass" = "10 %"'),
+        ("phase_servo", "moves.csv", '"mechanics.carriage_mass" = "10 %"'),
+        ("print_head", "letter.txt", '"mechanics.carriage_mass" = "10 %"'),
+        ("rotary_table", "index_sequence.toml", '"mechanics.table_inertia" = "10 %"'),
+        ("zoom", "zoom_sequence.toml", '"stepper.group_a.mechanics.friction_torque" = "3 %"'),
+    ],
+)
+def test_every_method_tells_its_yield_and_the_worst_machines(tmp_path, name, job, line):
+    """That of the print head ended in a traceback: what it is to print holds a table, and could not be told again."""
+    file = tmp_path / "axis.toml"
+    file.write_text(f"{(EXAMPLES / f'{name}.toml').read_text(encoding='utf-8')}\n[tolerance]\n{line}\n", "utf-8")
+    told = run(str(file), "--job", str(EXAMPLES / job), "--cases", "4", "--store", str(tmp_path / "store"), "--json")
+    assert told.exit_code in (0, 1), told.output
+    found = json.loads(told.stdout)
+    for one in found["worst"]:
+        values = found["quantities"][one["quantity"]]
+        is_least = one["quantity"].startswith("least_")
+        assert one["value"] <= values["least"] if is_least else one["value"] >= values["most"]
+        assert detent.load(tmp_path / "store" / "worst" / f"{one['quantity']}.toml")
+    assert found["worst"]
+    assert (tmp_path / "store" / "report.html").is_file()
+
+
+@pytest.mark.compiled
 def test_cases_do_not_depend_on_how_many_there_are(file, tmp_path):
     axis, job = detent.load(file), file.with_name("job.toml")
     few = axis.tolerance(job, cases=20, workers=1, store=tmp_path / "store")
