@@ -60,8 +60,10 @@ def going_first() -> Generator[None]:
     except (OSError, AttributeError):
         yield
     else:
-        yield
-        os.setpriority(os.PRIO_PROCESS, thread, before)
+        try:
+            yield
+        finally:
+            os.setpriority(os.PRIO_PROCESS, thread, before)
 
 
 def give_back() -> None:

@@ -72,8 +72,14 @@ def test_who_brings_a_stop_goes_before_who_only_computes(monkeypatch: pytest.Mon
     found: list[int] = []
     monkeypatch.setattr(os, "getpriority", lambda *_: 3, raising=False)
     monkeypatch.setattr(os, "setpriority", lambda *asked: found.append(asked[-1]), raising=False)
-    with going_first():
-        assert found == [NICENESS]
+
+    def run_until_interrupted() -> None:
+        with going_first():
+            assert found == [NICENESS]
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_until_interrupted()
     assert found == [NICENESS, 3]
 
     def refuse(*_: object) -> None:

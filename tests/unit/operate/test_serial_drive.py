@@ -282,7 +282,7 @@ PROGRAM = """#!{python}
 import struct, sys
 print("/dev/its-line", file=sys.stderr, flush=True)
 while len(sys.stdin.buffer.read({shown})) == {shown}:
-    sys.stdout.buffer.write(struct.pack("<BBd", 1, 1, 2.5))
+    sys.stdout.buffer.write(struct.pack("<BBBd", 1, 1, 1, 2.5))
     sys.stdout.buffer.flush()
 """
 
