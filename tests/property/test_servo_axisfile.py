@@ -121,7 +121,7 @@ def named_path(name, path):
 
 
 HELD = {"axis.name", "axis.method", "axis.motion", "disturbance.push.force", "disturbance.push.at"}
-ASIDE = ("disturbance.push", LOAD, BURST, "home.", "hardware.")
+ASIDE = ("disturbance.push", LOAD, BURST, "home.", "hardware.", "brake.")
 """Tables that are there as a whole or not at all."""
 
 

@@ -43,27 +43,11 @@ def missing() -> str:
 
 
 def findings(folder: str | Path, name: str) -> list[Finding]:
-    """Places of an export that break a rule of MISRA C:2012, as far as cppcheck knows these rules.
+    """Places of an export that break a rule of MISRA C:2012, as far as cppcheck knows these rules, by file and line.
 
     The sources that become firmware are looked at, with the hash of the registers, for a processor of 32 bits, in every
-    configuration that they have; the programs that prove them are not.
-
-    Parameters
-    ----------
-    folder : path
-        What `export_firmware` wrote.
-    name : str
-        Prefix of all names in C.
-
-    Returns
-    -------
-    list of Finding
-        By file and line.
-
-    Raises
-    ------
-    DetentError
-        cppcheck is not installed, or cannot read the sources.
+    configuration that they have; the programs that prove them are not. `folder` is what `export_firmware` wrote, `name`
+    the prefix of all names in C. A DetentError says that there is no cppcheck, or what it could not read.
     """
     place = Path(folder)
     if missing():

@@ -48,6 +48,7 @@ from detent.files.quantities import (
 
 MOST_SAMPLES = 63  # samples that the memory of an encoder or of the amplifier reaches back (`sensing.position_sensor`)
 
+MOST_SLIP = 1e3  # [m]
 BLOWS = 10  # times the largest effort that a blow from outside may twist a coupling by, which does not slip for that
 
 
@@ -305,7 +306,7 @@ class CascadeProtectionTable(MotionProtectionTable, frozen=True):
     slip: Length = optional(
         "difference between the encoders of motor and load", math.nan,
         derived="backlash, 10 x twist of the coupling at the largest effort, 4 counts, what their delays make of it",
-        ge=0.0, le=1e3,
+        ge=0.0, le=MOST_SLIP,
     )  # fmt: skip
     oscillation: Length = optional(
         "position error to one side and the other in turn, ten times, each within 100 ms", math.nan,
@@ -508,4 +509,4 @@ def _usual_slip(spec: CascadeSpec) -> float:
     twist = 0.0 if coupling is None else coupling.backlash + BLOWS * spec.largest_effort / coupling.stiffness
     late = abs(both[0].delay - both[1].delay) * spec.method.sample_period
     speed = 1.1 * max(spec.limits.speed, spec.method.velocity_limit)
-    return twist + 4 * sum(one.resolution for one in both) + late * speed
+    return min(twist + 4 * sum(one.resolution for one in both) + late * speed, MOST_SLIP)
