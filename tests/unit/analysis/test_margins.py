@@ -26,8 +26,11 @@ def test_nothing_lies_between_the_points_of_the_grid(axes):
         for cut, m in loop.margins.items():
             found = loop.open_loop(cut).response(frequencies)
             distance, gain = np.abs(1.0 + found), np.abs(found)
-            assert 1.0 / np.min(distance) <= m.sensitivity * (1 + 1e-9)
-            assert 1.0 / np.min(distance) == pytest.approx(m.sensitivity, rel=1e-3)
+            k = int(np.argmin(distance))  # a resonance without damping is sharper than the grid is fine
+            near = np.linspace(frequencies[max(k - 1, 0)], frequencies[min(k + 1, FINEST - 1)], 2001)
+            closest = min(np.min(distance), np.min(np.abs(1.0 + loop.open_loop(cut).response(near))))
+            assert 1.0 / closest <= m.sensitivity * (1 + 1e-9)
+            assert 1.0 / closest == pytest.approx(m.sensitivity, rel=1e-3)
             cross = np.flatnonzero((gain[1:] >= 1.0) != (gain[:-1] >= 1.0))
             phases = np.angle(-found[cross])
             if m.crossover:
