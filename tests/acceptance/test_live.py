@@ -846,14 +846,14 @@ def test_12_a_slide_that_a_fault_has_taken_the_torque_from_is_commanded_nothing_
 @pytest.mark.parametrize(("part", "steps"), [*enumerate([60] * 10 + [100] * 7 + [200] * 3)])
 def test_12_invariants_hold_in_a_thousand_sequences(part, steps):
     """Sequences of 60 to 200 rules, of which each is a command or more, or a fault; 1,000 of 50 commands or more."""
-    told = run_machine(AxisMachine, part, 60, steps)
+    told = run_machine(AxisMachine, part, 75, steps)
     assert sum(commands >= 50 for commands in told) >= 50
 
 
 @pytest.mark.wide
 @pytest.mark.parametrize("part", range(4))
 def test_12_no_pulse_is_lost_whatever_is_asked(part):
-    told = run_machine(PulseMachine, part, 60, 100)
+    told = run_machine(PulseMachine, part, 75, 100)
     assert sum(commands >= 50 for commands in told) >= 50
 
 
