@@ -7,6 +7,8 @@ const chromium = await browser();
 const open = async (link) => enter(await chromium.newContext({ viewport: { width: 900, height: 800 } }), link);
 const [one, other, viewer] = [await open(process.argv[2]), await open(process.argv[3]), await open(process.argv[4])];
 const who = (page) => page.locator("#who").textContent();
+/** What has been heard is drawn with the next picture of the page. */
+const drawn = (page, mine) => page.waitForFunction((own) => document.getElementById("who").textContent.startsWith("you") === own, mine);
 
 await one.keyboard.press("F2");
 await until(one, (s) => s.state === "operation enabled");
@@ -18,7 +20,8 @@ const hold = async () => {
   await until(one, (s) => s.running?.command === "jog" && s.velocity > 0.005);
 };
 await hold();
-await other.waitForTimeout(200);
+await drawn(one, true);
+await other.waitForFunction(() => document.getElementById("who").textContent.includes("engineer"));
 const found = { mine: await who(one), theirs: await who(other) };
 found.refused = await other.evaluate(() => window.panel.link.command("move_by", 0.001).then(({ ended }) => ended));
 found.viewerMoves = await viewer.evaluate(() => window.panel.link.command("move_by", 0.001).then(() => "taken", (error) => error.message));
@@ -31,6 +34,8 @@ await one.mouse.up();
 await hold();
 await other.evaluate(() => window.panel.link.command("take").then(({ ended }) => ended));
 await until(other, (s) => s.rests && s.running === null);
+await drawn(other, true);
+await drawn(one, false);
 found.afterTaking = { mine: await who(one), theirs: await who(other), pressed: await one.locator(".jog[aria-pressed=true]").count() };
 await one.mouse.up();
 console.log(JSON.stringify({ ...found, problems: [one, other, viewer].flatMap((page) => page.problems) }));
