@@ -296,12 +296,15 @@ class PulseMachine(AxisMachine):
             assert lowest - self.bench.grain <= self.a.commanded <= highest + self.bench.grain
 
 
-def run_machine(machine: type[AxisMachine], number: int, sequences: int, steps: int) -> list[int]:
-    """So many sequences of so many rules each, drawn from a number; gives how many commands each had."""
-    machine.sequences = []
-    seed(number)(machine)
-    run_state_machine_as_test(machine, settings=settings(
-        max_examples=sequences, stateful_step_count=steps, deadline=None, database=None,
-        phases=(Phase.generate, Phase.shrink), suppress_health_check=list(HealthCheck),
-    ))  # fmt: skip
-    return machine.sequences
+def run_machine(machine: type[AxisMachine], number: int, sequences: int, steps: int) -> int:
+    """Sequences of so many rules, drawn from a number, until so many have had 50 commands; gives how many had."""
+    machine.sequences, drawn = [], 0
+    while sum(commands >= 50 for commands in machine.sequences) < sequences:
+        seed(number + 1000 * drawn)(machine)
+        drawn += 1
+        run_state_machine_as_test(machine, settings=settings(
+            max_examples=max(sequences // min(drawn, 4), 5), stateful_step_count=steps, deadline=None, database=None,
+            phases=(Phase.generate, Phase.shrink), suppress_health_check=list(HealthCheck),
+        ))  # fmt: skip
+        assert drawn < 12
+    return sum(commands >= 50 for commands in machine.sequences)
