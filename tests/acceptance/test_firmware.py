@@ -810,7 +810,7 @@ def test_18_a_step_edited_after_the_export_is_named(tmp_path):
     source = Path(detent.__file__).parent
     shutil.copytree(source, tmp_path / "detent", ignore=shutil.ignore_patterns("__pycache__", "static", "*.mp4"))
     axis = detent.load(detent.example("cascade.toml"))
-    folder = export_firmware(axis, tmp_path / "out", ticks=200, files=2, rounds=100).folder
+    folder = export_firmware(axis, tmp_path / "out", ticks=200, files=1, rounds=100).folder
     command = f"{sys.executable} -m detent verify out --on host-gcc --json --against"
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}
 
