@@ -296,8 +296,8 @@ class PulseMachine(AxisMachine):
             assert lowest - self.bench.grain <= self.a.commanded <= highest + self.bench.grain
 
 
-def run_machine(machine: type[AxisMachine], number: int, sequences: int, steps: int) -> int:
-    """Sequences of so many rules, drawn from a number, until so many have had 50 commands; gives how many had."""
+def run_machine(machine: type[AxisMachine], number: int, sequences: int, steps: int) -> None:
+    """Sequences of so many rules, drawn from a number, until so many have had 50 commands."""
     machine.sequences, drawn = [], 0
     while sum(commands >= 50 for commands in machine.sequences) < sequences:
         seed(number + 1000 * drawn)(machine)
@@ -307,4 +307,3 @@ def run_machine(machine: type[AxisMachine], number: int, sequences: int, steps: 
             phases=(Phase.generate, Phase.shrink), suppress_health_check=list(HealthCheck),
         ))  # fmt: skip
         assert drawn < 12
-    return sum(commands >= 50 for commands in machine.sequences)

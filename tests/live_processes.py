@@ -107,11 +107,8 @@ def flooded(browser: Any, cookies: str, kind: str, socket: Socket, watcher: Any,
 
 
 def computed(pids: Sequence[int]) -> float:
-    """Processor time that processes have used [s], without that of a loop, whose priority is its own."""
-    whole = sum(time.clock_gettime(~pid << 3 | 2) for pid in pids)  # as clock_getcpuclockid(3) numbers their clocks
-    loops = (one for pid in pids for one in Path(f"/proc/{pid}/task").iterdir()
-             if os.sched_getscheduler(int(one.name)) == os.SCHED_FIFO)  # fmt: skip
-    return whole - sum(int((one / "schedstat").read_text(encoding="ascii").split()[0]) for one in loops) * 1e-9
+    """Processor time that processes have used [s]."""
+    return sum(time.clock_gettime(~pid << 3 | 2) for pid in pids)  # as clock_getcpuclockid(3) numbers their clocks
 
 
 @contextmanager
@@ -135,8 +132,7 @@ def stops(socket: Socket, watcher: Any, pids: Sequence[int]) -> Stops:
     """Stops, as many as 99 of 100 needs.
 
     From the request to its answer nothing sleeps: one of these processes computes, or waits for a processor. The time
-    in which they compute is what a stop takes on a machine that has nothing else to do, however busy this one is; what
-    a loop computes beside it, while they wait, is none of it.
+    in which they compute is what a stop takes on a machine that has nothing else to do, however busy this one is.
     """
     taken: list[tuple[float, float]] = []
     before = watcher.status["loop"]

@@ -22,10 +22,10 @@ class EncoderWord(Registers):
 class PositionSensorParams(Registers):
     """Graduation and evaluation."""
 
-    period: f8 = register("time between two samples", unit="s")
+    period: f8 = register("time between two samples", unit="s", range=(1e-6, 0.1))
     resolution: f8 = register("travel per count; 0: the encoder is an ideal one", unit="m")
     delay: i8 = register("samples until a position is read", unit="count", range=(0, MEMORY - 1))
-    span: i8 = register("number of samples of the velocity difference, 1 or more", unit="count", range=(0, MEMORY - 1))
+    span: i8 = register("number of samples of the velocity difference, 1 or more", unit="count", range=(1, MEMORY - 1))
     smoothing: f8 = register("part of a new velocity that is taken over at a sample; 1: no filter", unit="1")
 
 

@@ -16,6 +16,7 @@ from detent.export.verify import TARGETS, Target, differences, told_of, verify
 from detent.export.write import MANIFEST, export_firmware, read_manifest
 from detent.kernel.image import FNV_BASIS, FNV_PRIME, WHOLE, begin_hash
 from detent.kernel.registers import Registers, f8, i2_array, i8, register, u1
+from detent.methods.cascade.build import build_cascade
 from detent.methods.cascade.controller import CascadeControllerParams, coast, guard_axis, take_event
 from detent.methods.cascade.host import CascadeHost
 from detent.translate.values import RefusedError, Shape
@@ -235,8 +236,8 @@ def test_a_prefix_that_is_no_name_in_c_is_refused(axis, prefix):
         unit_of(axis, prefix)
 
 
-def test_a_parameter_outside_its_range_is_found():
-    p = CascadeControllerParams()
+def test_a_parameter_outside_its_range_is_found(axis):
+    p = build_cascade(axis.spec).controller
     p.motor_sensor.delay = 64
     assert list(outside_ranges(p)) == [("motor_sensor.delay", 64, (0, 63))]
 
