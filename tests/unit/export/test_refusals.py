@@ -11,6 +11,7 @@ from detent.export.unit import outside_ranges, unit_of
 from detent.export.vectors import Golden
 from detent.export.write import export_firmware, refuse_other_files
 from detent.kernel.step import step
+from detent.methods.cascade.build import build_cascade
 from detent.translate.program import Program
 from detent.translate.values import RefusedError
 
@@ -87,7 +88,7 @@ def test_fw12_tells_the_value_and_its_range(cascade, tmp_path, monkeypatch):
 
 
 def test_fw12_finds_a_parameter_outside_its_range(cascade):
-    params = unit_of(cascade).params()
+    params = build_cascade(cascade.spec).controller
     params.motor_sensor.delay = 64
     assert list(outside_ranges(params)) == [("motor_sensor.delay", 64, (0, 63))]
 
