@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -310,12 +311,14 @@ def tune(  # noqa: PLR0913 - what may be asked
     nominal = chooser.nominal()
     found = chooser.guaranteed() if file.tolerance and nominal.values else nominal
     worth = tuning.worth(tuning.stated), chooser.worth(nominal), chooser.worth(found)
-    further = chooser.further(nominal)
+    progress(0.8, "trying the gains of the file")
+    with ThreadPoolExecutor(1) as aside:  # steps leave a processor to it
+        further = aside.submit(chooser.further, nominal)
+        before = Stand.of(file, job)
+    further = further.result()
     refusals = [*_unknown(file), *_refusals(chooser, nominal, found, further)]
     kept = nominal if refusals else found
     chosen = dict(kept.values) | fed if kept.values else {}
-    progress(0.8, "trying the gains of the file")
-    before = Stand.of(file, job)
     progress(0.85, "trying the new gains")
     after = Stand.of(file.replaced(_typed(spec, chosen)), job) if kept.values else None
     hunted, stops = _stopped(after, hold, lambda at, text: progress(0.85 + 0.1 * at, text))
