@@ -841,8 +841,13 @@ def test_12_a_slide_that_a_fault_has_taken_the_torque_from_is_commanded_nothing_
     assert (bench.answer.rests, bench.answer.commanded_velocity) == (1, 0.0)
 
 
-@pytest.mark.wide
-@pytest.mark.parametrize(("part", "steps"), [*enumerate([60] * 10 + [100] * 7 + [200] * 3)])
+THOUSAND = [*enumerate([60] * 10 + [100] * 7 + [200] * 3)]  # parts of 50 sequences, and how many rules each has
+FIRST = {0, 1, 2, 10, 11, 17}  # that every change meets
+
+
+@pytest.mark.parametrize(("part", "steps"), [
+    pytest.param(*one, marks=pytest.mark.wide if one[0] in FIRST else pytest.mark.long) for one in THOUSAND
+])  # fmt: skip
 def test_12_invariants_hold_in_a_thousand_sequences(part, steps):
     """Sequences of 60 to 200 rules, of which each is a command or more, or a fault; 1,000 of 50 commands or more."""
     run_machine(AxisMachine, part, 50, steps)
