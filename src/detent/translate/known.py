@@ -11,11 +11,30 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from detent.translate.values import RefusedError, Value, number, outside_language
+from detent.translate.values import (
+    ANY,
+    ATOM,
+    RANK,
+    TYPES,
+    UNARY,
+    UNSIGNED,
+    RefusedError,
+    Value,
+    as_whole,
+    bits_of,
+    in_brackets,
+    number,
+    outside_language,
+    real,
+)
 
 if TYPE_CHECKING:
     from detent.translate.program import Function, Program
 
+SUFFIXES = {"int64_t": "i64", "int32_t": "i32", "int": "int"}  # of helpers that exist for several types
+SHORT = SUFFIXES | {
+    "int8_t": "i8", "int16_t": "i16", "uint8_t": "u8", "uint16_t": "u16", "uint32_t": "u32", "unsigned": "unsigned"
+}  # fmt: skip
 FLIPPED: dict[Any, Any] = {
     ast.Lt: ast.Gt,
     ast.LtE: ast.GtE,
@@ -107,6 +126,57 @@ class Known:
         if method is None:
             raise outside_language(node, f"the expression {type(node).__name__}", "write it with what a step may hold")
         return method(node)
+
+    # ---- types
+
+    def helper(self, name: str, ctype: str) -> str:
+        """Name of a function that every program has which needs it."""
+        made = f"{name}_{SUFFIXES[ctype]}" if ctype else name
+        self.program.notes.helpers.add(made)
+        return f"{self.program.name}_{made}"
+
+    def converted(self, value: Value, ctype: str) -> Value:
+        """An integer in another type that holds it: by a cast, or by a function where it is an operator's result."""
+        widens = RANK[value.ctype] < RANK[ctype] or (ctype in UNSIGNED) != (value.ctype in UNSIGNED)
+        if value.is_composite and widens:
+            text = f"{self.helper(f'{SHORT[ctype]}_of_{SHORT[value.ctype]}', '')}({value.text})"
+            return replace(value, text=text, ctype=ctype, level=ATOM)
+        return replace(value, text=f"({ctype}){in_brackets(value, UNARY)}", ctype=ctype, level=UNARY)
+
+    def cast(self, value: Value, ctype: str) -> Value:
+        """An integer in another type that holds it; C widens small ones by itself."""
+        if value.ctype == ctype or value.literal or (RANK[value.ctype] < RANK[ctype] and not value.is_composite):
+            return value
+        return self.converted(value, ctype)
+
+    def brought_to(self, bits: int, *values: Value) -> tuple[str, list[Value]]:
+        """Operands such that C computes in the type of so many bits, all of them with a sign; that type, and they."""
+        if bits == 16 and any(RANK[one.ctype] >= 32 and not one.literal for one in values):
+            bits = 32
+        ctype = TYPES[min(bits, 64)]
+        made = [
+            self.converted(one, ctype)
+            if RANK[one.ctype] > RANK[ctype] or one.ctype in UNSIGNED or (one.is_composite and one.ctype != ctype)
+            else one
+            for one in values
+        ]
+        if bits > 16 and not any(one.ctype == ctype and not (one.literal and bits == 32) for one in made):
+            k = next((n for n, one in enumerate(made) if not one.literal), 0)
+            made[k] = self.converted(made[k], ctype)
+        return ctype, made
+
+    def as_real(self, value: Value) -> Value:
+        """A number as a float, as Python takes it beside one."""
+        if value.kind == "float":
+            return value
+        if value.kind == "bool" and value.truth is None:
+            return real(f"{in_brackets(value, UNARY)} ? 1.0 : 0.0", ANY + 1)
+        value = as_whole(value)
+        if value.is_constant and bits_of(value.lo) <= 32:
+            return number(float(value.lo))
+        if value.is_composite:
+            return real(f"{self.helper(f'f64_of_{SHORT[value.ctype]}', '')}({value.text})")
+        return real(f"(double){in_brackets(value, UNARY)}", UNARY)
 
     # ---- facts
 
