@@ -63,7 +63,7 @@ class Expressions(Integers):
         name, ctype = self.temporary(), type_of_local(value)
         text = self.cast(value, ctype).text if value.kind == "int" else value.text
         self.pre.append(f"const {ctype} {name} = {text};")
-        return replace(value, text=name, level=ATOM, ctype=ctype)
+        return replace(value, text=name, level=ATOM, ctype=ctype, of=None)
 
     def ordered(self, nodes: list[ast.expr]) -> list[Value]:
         """Values from left to right: what stands beside a call that writes is kept before it, as is its result."""
@@ -131,8 +131,7 @@ class Expressions(Integers):
         if table is not None:
             return array_of(table, "array")
         if found.length:
-            trusted = found.range if registers in self.program.fixed else None
-            return Value(kind="array", text=place, width=found.width, length=found.length, within=trusted)
+            return Value(kind="array", text=place, width=found.width, length=found.length, within=found.range)
         fixed = self.program.options.get((registers, found.name))
         if fixed is not None:
             return number(fixed)
@@ -345,7 +344,7 @@ class Expressions(Integers):
             a, b = (unsigned(one) if one.literal else one for one in (a, b))
         elif beside is not None and beside.lo >= 0 and RANK[beside.ctype] < 32:
             pass
-        elif not {a.ctype, b.ctype} <= UNSIGNED:
+        elif not {a.ctype, b.ctype} <= UNSIGNED or (a.ctype != b.ctype and (a.is_composite or b.is_composite)):
             bits = 64 if RANK[a.ctype] == 64 or RANK[b.ctype] == 64 else bits_of(a.lo, a.hi, b.lo, b.hi)
             _, (a, b) = self.brought_to(bits, a, b)
         return truth(f"{in_brackets(a, UNARY)} {SIGNS[op]} {in_brackets(b, UNARY)}")

@@ -5,6 +5,7 @@ step wraps. Nothing relies on what C leaves to the compiler.
 """
 
 import ast
+from dataclasses import replace
 from typing import Any
 
 from detent.translate.known import Known
@@ -22,9 +23,12 @@ from detent.translate.values import (
     in_brackets,
     number,
     outside_language,
+    unsigned,
     whole,
 )
 
+WRAPPED = {"+": "add", "-": "sub", "*": "mul"}
+BITS = {"uint8_t": 8, "uint16_t": 16, "uint32_t": 32}
 LONGEST: dict[type[ast.operator], int] = {ast.LShift: 62, ast.RShift: 63}  # shift that is defined in 64 bits
 
 
@@ -47,19 +51,21 @@ class Integers(Known):
         """Text of a left operand: in brackets but for a chain of operators of one kind."""
         return value.text if value.level == level else in_brackets(value, UNARY)
 
-    def wrapped(self, operation: str, *operands: Value) -> Value:
+    def wrapped(self, sign: str, a: Value, b: Value) -> Value:
         """What may go beyond 64 bits: computed without a sign there, and taken back."""
-        texts = ", ".join(self.cast(one, "int64_t").text for one in operands)
-        return whole(f"{self.helper(f'wrap_{operation}', 'int64_t')}({texts})", "int64_t", LOWEST, HIGHEST)
+        texts = ", ".join(self.cast(one, "int64_t").text for one in (a, b))
+        operation = self.helper(f"wrap_{WRAPPED[sign]}", "int64_t")
+        return replace(whole(f"{operation}({texts})", "int64_t", LOWEST, HIGHEST), of=(sign, a, b))
 
     def _sum(self, node: ast.AST, sign: str, level: int, a: Value, b: Value, ends: tuple[int, int]) -> Value:  # noqa: PLR0913
         lo, hi = ends
         bits = bits_of(lo, hi, a.lo, a.hi, b.lo, b.hi)
         if bits == 128:
             self.wraps(node, "may go beyond 64 bits")
-            return self.wrapped({"+": "add", "-": "sub", "*": "mul"}[sign], a, b)
+            return self.wrapped(sign, a, b)
+        of = (sign, a, b)
         ctype, (a, b) = self.brought_to(bits, a, b)
-        return whole(f"{self.beside(a, level)} {sign} {in_brackets(b, UNARY)}", ctype, lo, hi, level)
+        return replace(whole(f"{self.beside(a, level)} {sign} {in_brackets(b, UNARY)}", ctype, lo, hi, level), of=of)
 
     def i_Add(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802 - as the syntax tree has it
         """``a + b``."""
@@ -123,7 +129,8 @@ class Integers(Known):
         """By how much to shift, without a sign."""
         if value.literal:
             return value.text
-        return (value if value.ctype in UNSIGNED else self.converted(value, "unsigned")).text
+        plain = value.ctype in UNSIGNED and not value.is_composite
+        return (value if plain else self.converted(value, "unsigned")).text
 
     def i_RShift(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802
         """``a >> b``, rounded down whatever the compiler does with a sign."""
@@ -136,9 +143,12 @@ class Integers(Known):
         return whole(text, ctype, min(corners), max(corners))
 
     def _bitwise(self, sign: str, a: Value, b: Value, lo: int, hi: int) -> Value:
-        ctype, (a, b) = self.brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
-        # With a sign in it, C's small types would give another type than that of the result.
-        return whole(f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}", ctype, lo, hi, ANY)
+        of, ctype = (sign, a, b), _type_without_sign(a, b)
+        if ctype:
+            a, b = (unsigned(one) if one.literal else one for one in (a, b))
+        else:  # with a sign in it, C's small types would give another type than that of the result
+            ctype, (a, b) = self.brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
+        return replace(whole(f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}", ctype, lo, hi, ANY), of=of)
 
     def i_BitAnd(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802
         """``a & b``."""
@@ -162,9 +172,10 @@ class Integers(Known):
         bits = bits_of(-value.hi, -value.lo, value.lo, value.hi)
         if bits == 128:
             self.wraps(node, "may go beyond 64 bits")
-            return self.wrapped("sub", number(0), value)
+            return self.wrapped("-", number(0), value)
+        of = ("-", number(0), value)
         ctype, (value,) = self.brought_to(bits, value)
-        return whole(f"-{in_brackets(value, 0)}", ctype, -value.hi, -value.lo, UNARY)
+        return replace(whole(f"-{in_brackets(value, 0)}", ctype, -value.hi, -value.lo, UNARY), of=of)
 
     def magnitude(self, node: ast.AST, value: Value) -> Value:
         """``abs(value)``."""
@@ -185,6 +196,14 @@ class Integers(Known):
             ctype, (a, b) = self.brought_to(bits_of(first.lo, first.hi, other.lo, other.hi), first, other)
             first = whole(f"{self.helper(name, ctype)}({a.text}, {b.text})", ctype, lo, hi)
         return first
+
+
+def _type_without_sign(a: Value, b: Value) -> str:
+    """The type of both operands where they have no sign and one type; a number has any that holds it."""
+    known = {one.ctype for one in (a, b) if not one.literal}
+    ctype = known.pop() if len(known) == 1 else ""
+    fits = all(0 <= one.lo <= one.hi < 1 << BITS.get(ctype, 0) for one in (a, b) if one.literal)
+    return ctype if ctype in BITS and fits else ""
 
 
 def _of_same_bits(a: Value, b: Value) -> tuple[int, int]:

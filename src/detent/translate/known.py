@@ -9,12 +9,15 @@ import ast
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
 from detent.translate.values import (
     ANY,
     ATOM,
+    PRODUCT,
     RANK,
+    SUM,
     TYPES,
     UNARY,
     UNSIGNED,
@@ -26,6 +29,8 @@ from detent.translate.values import (
     number,
     outside_language,
     real,
+    unsigned,
+    whole,
 )
 
 if TYPE_CHECKING:
@@ -136,9 +141,21 @@ class Known:
         return f"{self.program.name}_{made}"
 
     def converted(self, value: Value, ctype: str) -> Value:
-        """An integer in another type that holds it: by a cast, or by a function where it is an operator's result."""
-        widens = RANK[value.ctype] < RANK[ctype] or (ctype in UNSIGNED) != (value.ctype in UNSIGNED)
-        if value.is_composite and widens:
+        """An integer in another type that holds it: by a cast, or by a function where it is an operator's result.
+
+        Of a result whose lower bits are enough, or whose operands have no sign, the operands are converted instead.
+        """
+        loses, gains = (a and not b for a, b in permutations((ctype in UNSIGNED, value.ctype in UNSIGNED)))
+        bits = 32 if ctype == "uint32_t" else 16
+        if value.is_composite and value.of is not None and loses and RANK[value.ctype] >= bits:
+            value = self.modular(value, bits)
+        elif value.is_composite and value.of is not None and gains:
+            sign, *operands = value.of
+            made, (a, b) = self.brought_to(bits_of(*(end for one in operands for end in (one.lo, one.hi))), *operands)
+            value = replace(value, text=f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}", ctype=made, of=None)
+        if value.ctype == ctype:
+            return value
+        if value.is_composite and (RANK[value.ctype] < RANK[ctype] or (ctype in UNSIGNED) != (value.ctype in UNSIGNED)):
             text = f"{self.helper(f'{SHORT[ctype]}_of_{SHORT[value.ctype]}', '')}({value.text})"
             return replace(value, text=text, ctype=ctype, level=ATOM)
         return replace(value, text=f"({ctype}){in_brackets(value, UNARY)}", ctype=ctype, level=UNARY)
@@ -148,6 +165,23 @@ class Known:
         if value.ctype == ctype or value.literal or (RANK[value.ctype] < RANK[ctype] and not value.is_composite):
             return value
         return self.converted(value, ctype)
+
+    def modular(self, value: Value, bits: int) -> Value:
+        """The lower 16 or 32 bits of an integer, without a sign: of a sum, made of those of its operands alone."""
+        ctype = {16: "unsigned", 32: "uint32_t"}[bits]
+        if value.ctype in UNSIGNED and RANK[value.ctype] <= RANK[ctype]:
+            return value
+        if value.literal and 0 <= value.lo < 1 << bits - 1:
+            return unsigned(value)
+        if value.of is None or RANK[value.ctype] < bits or value.ctype in UNSIGNED:
+            return self.converted(replace(value, of=None), ctype)
+        sign, *operands = value.of
+        level = {"+": SUM, "-": SUM, "*": PRODUCT}.get(sign, ANY)
+        a, b = (self.modular(one, bits) for one in operands)
+        if ctype not in (a.ctype, b.ctype):
+            a = self.converted(a, ctype)
+        left = a.text if a.level == level < ANY else in_brackets(a, UNARY)
+        return whole(f"{left} {sign} {in_brackets(b, UNARY)}", ctype, 0, (1 << bits) - 1, level)
 
     def brought_to(self, bits: int, *values: Value) -> tuple[str, list[Value]]:
         """Operands such that C computes in the type of so many bits, all of them with a sign; that type, and they."""

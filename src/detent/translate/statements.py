@@ -144,7 +144,7 @@ class Statements(Calls):
             raise outside_language(node, f"a result of kind {value.kind}", f"return what is announced, {kind}")
         if kind == "int":
             old = self.f.result
-            made = join(old, replace(value, text="", level=ATOM, literal=False))
+            made = join(old, replace(value, text="", level=ATOM, literal=False, of=None))
             made = widen(old, made) if self.program.widens else made
             if old is None or (old.lo, old.hi) != (made.lo, made.hi):
                 self.f.result, self.program.changed = made, True
@@ -328,7 +328,7 @@ class Statements(Calls):
     def note(self, name: str, value: Value) -> Value:
         """A variable holds this value, too; what it is in all."""
         old = self.f.names.get(name)
-        made = join(old, replace(value, text=name, level=ATOM, truth=None, literal=False))
+        made = join(old, replace(value, text=name, level=ATOM, truth=None, literal=False, of=None))
         made = widen(old, made) if self.program.widens else made
         if made.kind == "int":
             made = replace(made, ctype=type_of_local(made))
@@ -359,7 +359,7 @@ class Statements(Calls):
             self.check_index(target, array, index)
             if array.kind == "signal" or array.width is None:
                 raise outside_language(target, f"a store to {ast.unparse(target)}", "store to registers")
-            place, width, claimed, written = f"{array.text}[{index.text}]", array.width, None, None
+            place, width, claimed, written = f"{array.text}[{index.text}]", array.width, array.within, None
         else:
             raise outside_language(target, f"a store to {ast.unparse(target)}", "store to names and registers")
         if written in self.program.fixed:
@@ -432,6 +432,7 @@ class Statements(Calls):
         ctype, (lo, hi) = INTEGERS[width.code], interval_of(width)
         if value.ctype == ctype:
             return value.text
-        if width.is_signed and not (lo <= value.lo and value.hi <= hi):
-            return f"{self.helper(f'wrap_{width.code}', '')}({value.text})"
+        if width.is_signed and width.size < 8 and not (lo <= value.lo and value.hi <= hi):
+            made = self.modular(value, 16 if width.size < 4 else 32)
+            return f"{self.helper(f'wrap_{width.code}', '')}({made.text})"
         return self.converted(value, ctype).text

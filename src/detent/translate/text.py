@@ -140,7 +140,7 @@ WHOLE_HELPERS = {
 }
 """,
 }
-WRAP = """{t} N(wrap_{c})(int64_t value)
+WRAP = """{t} N(wrap_{c})({w} value)
 {{
     const {u} bits = ({u})value;
     return (bits > ({u}){most}) ? ({t})(-({t})({u})~bits - 1) : ({t})bits;
@@ -209,7 +209,8 @@ def helper_text(name: str, prefix: str, storage: str = "static ") -> str:
     elif kind.endswith("_of"):
         text = CONVERTED.format(name=name, to=LONG[kind.removesuffix("_of")], of=LONG[of])
     elif kind == "wrap":
-        text = WRAP.format(t=C_TYPES[of], u=UNSIGNED[of], c=of, most=MOST[of])
+        wide = "uint32_t" if of == "i4" else "unsigned"
+        text = WRAP.format(t=C_TYPES[of], u=UNSIGNED[of], w=wide, c=of, most=MOST[of])
     else:
         t, u = {"i64": ("int64_t", "uint64_t"), "i32": ("int32_t", "uint32_t")}.get(of, ("int", "unsigned"))
         text = HELPERS[kind].format(t=t, u=u, c=of)
@@ -218,10 +219,20 @@ def helper_text(name: str, prefix: str, storage: str = "static ") -> str:
 
 def helpers_text(program: Program) -> str:
     """All helpers that a program needs, the ones that others call first."""
-    needed = program.notes.helpers
+    needed = _used(program)
     storage = program.shape.storage or "static "
     order = sorted(needed, key=lambda one: (one in ("floor", "round"), one))
     return "\n".join(helper_text(one, program.name, storage) for one in order)
+
+
+def _used(program: Program) -> set[str]:
+    """Helpers that the functions call, and those that these call; a sum may have been made in another way."""
+    found, waiting = set[str](), [program.texts[f.py] for f in program.order]
+    for text in waiting:
+        called = set(re.findall(rf"\b{program.name}_(\w+)\(", text)) & program.notes.helpers
+        waiting += [helper_text(one, program.name) for one in called - found]
+        found |= called
+    return found
 
 
 def comment_of(text: str) -> str:

@@ -88,8 +88,9 @@ class Value:
     width: Width | None = None  # of the elements of an array or a signal
     length: int = 0  # of an array, and of a signal that is a table
     element: str = "{text}[{index}]"  # text of an element of an array or a signal
-    within: tuple[float, float] | None = None  # range of its elements, where it can be relied on
+    within: tuple[float, float] | None = None  # range of its elements
     literal: bool = False  # a number, or the name of one
+    of: "tuple[str, Value, Value] | None" = None  # operator and operands, whose lower bits alone make its lower bits
 
     @property
     def is_constant(self) -> bool:
