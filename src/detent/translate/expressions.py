@@ -223,7 +223,7 @@ class Expressions(Integers):
     def e_BoolOp(self, node: ast.BoolOp) -> Value:  # noqa: N802
         """``and`` and ``or`` of truth values; each part knows that those before it held, or did not."""
         both = isinstance(node.op, ast.And)
-        before, mark, parts = self.facts.copy(), len(self.pre), list[str]()
+        before, mark, parts = self.facts.copy(), len(self.pre), list[Value]()
         for k, one in enumerate(node.values):
             self.guarded += k > 0
             value = as_truth(self.expr(one))
@@ -233,9 +233,9 @@ class Expressions(Integers):
             mark = len(self.pre)
             self.suppose(one, holds=both)
             if value.truth is None:
-                parts.append(in_brackets(value, UNARY))
+                parts.append(value)
             elif value.truth != both:  # it decides
-                parts = [*parts, value.text] if parts else []
+                parts = [*parts, value] if parts else []
                 if not parts:
                     self.facts = before
                     return decided(not both)
@@ -245,10 +245,10 @@ class Expressions(Integers):
             self.written()
         return self._linked(both, parts) if parts else decided(both)
 
-    def _linked(self, both: bool, parts: list[str]) -> Value:  # noqa: FBT001 - a truth value
+    def _linked(self, both: bool, parts: list[Value]) -> Value:  # noqa: FBT001 - a truth value
         if len(parts) == 1:
-            return truth(parts[0], UNARY)
-        return truth((" && " if both else " || ").join(parts))
+            return parts[0]
+        return truth((" && " if both else " || ").join(in_brackets(one, UNARY) for one in parts))
 
     def e_IfExp(self, node: ast.IfExp) -> Value:  # noqa: N802
         """``a if test else b``."""

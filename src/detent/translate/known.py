@@ -9,7 +9,6 @@ import ast
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
 from detent.translate.values import (
@@ -145,16 +144,18 @@ class Known:
 
         Of a result whose lower bits are enough, or whose operands have no sign, the operands are converted instead.
         """
-        loses, gains = (a and not b for a, b in permutations((ctype in UNSIGNED, value.ctype in UNSIGNED)))
-        bits = 32 if ctype == "uint32_t" else 16
-        if value.is_composite and value.of is not None and loses and RANK[value.ctype] >= bits:
-            value = self.modular(value, bits)
-        elif value.is_composite and value.of is not None and gains:
-            sign, *operands = value.of
-            made, (a, b) = self.brought_to(bits_of(*(end for one in operands for end in (one.lo, one.hi))), *operands)
-            value = replace(value, text=f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}", ctype=made, of=None)
-        if value.ctype == ctype:
-            return value
+        bits, before = 32 if ctype == "uint32_t" else 16, value.ctype
+        if value.is_composite and value.of is not None and (ctype in UNSIGNED) != (before in UNSIGNED):
+            if before in UNSIGNED:
+                sign, *operands = value.of
+                ends = [end for one in operands for end in (one.lo, one.hi)]
+                made, (a, b) = self.brought_to(bits_of(*ends), *operands)
+                text = f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}"
+                value = replace(value, text=text, ctype=made, of=None)
+            elif RANK[before] >= bits:
+                value = self.modular(value, bits)
+            if value.ctype == ctype:
+                return value
         if value.is_composite and (RANK[value.ctype] < RANK[ctype] or (ctype in UNSIGNED) != (value.ctype in UNSIGNED)):
             text = f"{self.helper(f'{SHORT[ctype]}_of_{SHORT[value.ctype]}', '')}({value.text})"
             return replace(value, text=text, ctype=ctype, level=ATOM)

@@ -100,7 +100,7 @@ def test_an_operand_without_a_sign_stands_beside_a_number_without_one():
 
 def test_an_operators_result_is_made_wider_or_unsigned_by_a_function():
     text = text_of(firmware_steps.signs)
-    assert "r->inner.word = t_u16_of_int(r->half & 7);" in text
+    assert "r->inner.word = (uint16_t)((unsigned)r->half & 7U);" in text
     assert "r->count = t_i64_of_i32(r->half * (int32_t)p->form);" in text
     assert "r->angle = t_f64_of_i32((int32_t)r->half + T_STRIDE);" in text
     assert "r->other = (int64_t)t_shift_down_int((int)p->form, p->shift);" in text
