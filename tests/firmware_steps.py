@@ -10,6 +10,7 @@ from detent.kernel.step import bounded
 PLACES = 8
 WEIGHTS = (3, -1, 4)
 NEXT = (1, 2, 0, -5)
+LAST, STRIDE, UNUSED = 255, 1, 1000
 UNKNOWN: Any = object()
 
 
@@ -119,7 +120,19 @@ def kept_calls(p: Limits, r: State, a: int, b: int) -> None:
     r.count += always(r) * 0
 
 
-ACCEPTED = (arithmetic, conditions, floats, loops, effects, kept_calls)
+def signs(p: Limits, r: State, _a: int, _b: int) -> None:
+    """Registers with a sign beside some without."""
+    if p.form in (LAST, STRIDE):
+        r.count = r.half * p.form
+    elif r.inner.word > p.form:
+        r.angle = r.half + STRIDE
+    if p.form > 255:
+        r.count = UNUSED
+    r.inner.word = r.half & 7
+    r.other = p.form >> p.shift
+
+
+ACCEPTED = (arithmetic, conditions, floats, loops, effects, kept_calls, signs)
 
 
 def folded(p: Limits, r: State) -> None:

@@ -139,9 +139,10 @@ def verify(
     """
     from detent.axis import load
     from detent.export import measure as measuring
-    from detent.export import teeth
+    from detent.export import misra, teeth
     from detent.export import verify as proving
     from detent.export.show import shown
+    from detent.export.write import manifest_of
 
     if printed is not None:
         for line in shown(printed):
@@ -158,7 +159,8 @@ def verify(
             measuring.measure(folder, chosen, frequency, progress),
             teeth.reach(folder) if coverage_bar is not None else None, coverage_bar or 0.0,
             teeth.mutants(folder, mutants, progress) if mutants else [],
-            {} if on else proving.left_out(folder),
+            {} if on else proving.left_out(folder) | ({misra.TOOL: misra.missing()} if misra.missing() else {}),
+            [] if on or misra.missing() else misra.findings(folder, manifest_of(folder)["name"]),
         )  # fmt: skip
     measuring.note(folder, **found.kept(), clock=clock)
     if as_json:
@@ -182,12 +184,14 @@ class _Found:
     bar: float  # of branch outcomes [%]
     mutants: list[Any]
     left_out: dict[str, str]
+    broken: list[Any]  # rules of MISRA C
 
     @property
     def done(self) -> bool:
         """True where all was run and equal, and no bar is missed."""
         equal = bool(self.proofs) and all(one.equal for one in self.proofs) and not self.differences
-        return equal and (self.reach is None or self.reach.share >= self.bar)
+        kept = all(one.is_deviation for one in self.broken)
+        return equal and kept and (self.reach is None or self.reach.share >= self.bar)
 
     @property
     def reached(self) -> dict[str, Any] | None:
@@ -197,18 +201,23 @@ class _Found:
     def kept(self) -> dict[str, Any]:
         """What the manifest keeps."""
         from detent.export.measure import plain
+        from detent.export.misra import tallied
 
         hits = {"found": sum(bool(one.found) for one in self.mutants), "of": len(self.mutants)}
-        return {"measured": plain(self.measured), "coverage": self.reached, "mutants": hits if self.mutants else None}
+        kept = {"measured": plain(self.measured), "coverage": self.reached, "mutants": hits if self.mutants else None}
+        return kept | {"misra": tallied(self.broken)}
 
     def plain(self) -> dict[str, Any]:
         """All of it as plain data."""
         rows = {"equal": self.done, "proofs": [asdict(p) for p in self.proofs], "differences": self.differences}
         rows |= {"not run": self.left_out, "reach": self.reached, "mutants": [asdict(m) for m in self.mutants]}
-        return rows | {"measured": self.kept()["measured"]}
+        kept = self.kept()
+        return rows | {"measured": kept["measured"], "misra": kept["misra"]}
 
     def tell(self) -> None:
         """Say it, the verdict last."""
+        from detent.export.misra import DEVIATIONS
+
         if self.reach is not None:
             share = self.reach.share
             say(f"branch outcomes taken: {share:.1f} % of {self.reach.outcomes}", wrong=share < self.bar)
@@ -223,6 +232,10 @@ class _Found:
             say(f"{one.target:<11} {one.level.split()[0] if one.level else '':<4} {said}", wrong=not one.equal)
         for text in self.differences:
             say(text, wrong=True)
+        for one in (one for one in self.broken if not one.is_deviation):
+            say(f"{one.file}:{one.line} breaks rule {one.rule} of MISRA C:2012", wrong=True)
+        for rule, count in self.kept()["misra"].items():
+            tell(f"MISRA C:2012, rule {rule}: {count} times; {DEVIATIONS.get(rule, 'not to be broken')}")
         for name, tools in self.left_out.items():
             tell(f"{name:<11} not run: {'' if tools.startswith('FW') else 'needs '}{tools}")
         if not self.proofs:

@@ -24,9 +24,13 @@ NEVER = 1 << 62
 class ColumnTimerParams(Registers):
     """Geometry of the line and lead of the wires."""
 
-    column_zero: i4 = register("carriage position of column 0, 1/256 emitter", unit="emitter/256")
-    column_pitch: i4 = register("distance of two columns, 1/256 emitter", unit="emitter/256")
-    lead_per_speed: i4 = register("flight lead per speed value, 1/65536 emitter", unit="emitter/65536")
+    column_zero: i4 = register(
+        "carriage position of column 0, 1/256 emitter", unit="emitter/256", range=(0, 0xFFFFFF)
+    )
+    column_pitch: i4 = register("distance of two columns, 1/256 emitter", unit="emitter/256", range=(1, 0xFFFF))
+    lead_per_speed: i4 = register(
+        "flight lead per speed value, 1/65536 emitter", unit="emitter/65536", range=(0, 1 << 16)
+    )
 
 
 class LineBuffer(Registers):
@@ -45,7 +49,7 @@ class ColumnTimer(Registers):
     active: u1 = register("1 while columns of the running line are still to be fired")
     column: i4 = register("next column to fire", range=(0, COLUMNS - 1))
     end_column: i4 = register("last column of the line in the direction of motion", range=(0, COLUMNS - 1))
-    lead: i4 = register("flight lead at the commanded speed, 1/256 emitter", unit="emitter/256")
+    lead: i4 = register("flight lead at the commanded speed, 1/256 emitter", unit="emitter/256", range=(0, 0xFFFF))
     fire_us: i8 = register("time at which the next column fires; far future when none is due", unit="us")
     fired: i8 = register("columns printed so far", unit="count")
     missed: i8 = register("inked columns passed without being fired", unit="count")

@@ -5,6 +5,7 @@ from detent.control.head_computer import (
     BYTES,
     CONTROLLED_RUN,
     ILLEGAL,
+    LARGEST_END,
     NO_OPERATION,
     OK,
     OUT_OF_RANGE,
@@ -50,7 +51,8 @@ def enqueue(c: HeadComputer, operation: int, start: int, end: int) -> None:
     A refusal waits too, so that answers keep the order of the commands: the last place counts those of a full queue.
     """
     if c.queue.waiting >= QUEUE:
-        c.queue.end[(c.queue.first + QUEUE - 1) & (QUEUE - 1)] += 1
+        k = (c.queue.first + QUEUE - 1) & (QUEUE - 1)
+        c.queue.end[k] = min(c.queue.end[k] + 1, LARGEST_END)
         return
     if c.queue.waiting == QUEUE - 1 or (is_motion(operation) and c.queue.motions > 0):
         operation, start, end = REFUSED, OVERRUN, 0
@@ -129,12 +131,13 @@ def receive_byte(p: HeadParams, c: HeadComputer) -> None:
 @step
 def set_speed(c: HeadComputer) -> int:
     """SET SPEED: a new value erases the kept drives of both directions (3.5)."""
-    if c.end < SLOWEST or c.end > FASTEST:
+    s = c.end
+    if s < SLOWEST or s > FASTEST:
         return OUT_OF_RANGE
-    if c.end != c.maximum:
+    if s != c.maximum:
         forget_drive(c, 1)
         forget_drive(c, -1)
-    c.maximum = c.end
+    c.maximum = s
     return OK
 
 

@@ -6,7 +6,7 @@ counts; per-direction values end in `_right` and `_left`. Print-head specificati
 
 from detent.control.column_timer import ColumnTimer, ColumnTimerParams, LineBuffer
 from detent.control.latch import Latch, StatusPort
-from detent.control.self_identification import IdentifiedLine, PlausibleLimits
+from detent.control.self_identification import LONGEST, SLOPES, IdentifiedLine, PlausibleLimits
 from detent.kernel.registers import Registers, block, i1, i2, i4, i4_array, i8, register, u1, u1_array, u2
 from detent.kernel.step import step
 
@@ -48,6 +48,24 @@ QUEUE = 4
 """Commands that wait, the last place for refused ones; only one of them may be a motion command."""
 
 
+SPEEDS = (0, 240)
+"""Speed values, of which 240 is 40 in/s."""
+
+COUNTS = (0, 300)
+"""Drive values of the parameters: 300 counts are the whole supply."""
+
+FAR = 1 << 20
+"""Emitters from the left frame at which counting ends: 16 times what a command can name."""
+
+WINDOWS = 1 << 15
+"""Complete windows of a pass that are counted: at 10 in/s there are 18 of them on the longest travel."""
+
+PLACES = (-2 * FAR, 2 * FAR)
+"""Places and ways that are worked out from that, and from what a command names."""
+
+LARGEST_START, LARGEST_END = 0xFFFFFF, 0xFFFF
+"""Of the arguments of a command, of three and of two bytes."""
+
 BYTES = 8
 """Of a command at most: its first one tells of up to seven more."""
 
@@ -63,26 +81,32 @@ class HeadOutputs(Registers):
 class HeadParams(Registers):
     """Options and constants of the axis computer."""
 
-    slope_default: i4 = register("power-on slope K", unit="count/256")
-    friction_default: i4 = register("power-on friction Vf", unit="count")
-    ir: i4 = register("IR term of acceleration and braking", unit="count")
-    drive_limit: i4 = register("largest drive magnitude", unit="count")
-    span_steady: u1 = register("1: ramp interval from the whole steady drive (literal), 0: from its back-EMF part")
-    ack_last: u1 = register("1: the last byte of a command is acknowledged too")
-    transition: u1 = register("1: transition mode, 0: coast until the drive value reaches zero")
-    friction_jump: u1 = register("1: turn-around jumps by the friction of both directions")
-    trim: u1 = register("1: steady speed is trimmed every 16 ms")
-    overspeed_test: u1 = register("1: low speed halves the drive above 17/16 of the speed")
-    memory: u1 = register("1: the trimmed drive is kept for the next move of the same speed")
-    zero_speed_us: i4 = register("standstill: no emitter for this long", unit="us")
-    contact_us: i4 = register("contact while homing: no emitter for this long", unit="us")
-    homing_speed: i4 = register("speed value of homing", unit="1/6 in/s")
-    homing_limit: i4 = register("drive limit of homing", unit="count")
-    run_speed: i4 = register("speed value of RUN and of the fast calibration pass", unit="1/6 in/s")
-    print_speed: i4 = register("preselected speed value at power-on", unit="1/6 in/s")
-    expected_width: i4 = register("travel between the frames", unit="emitter")
-    width_tolerance: i4 = register("narrower by more than this is an obstruction", unit="emitter")
-    calibration_margin: i4 = register("stop target of calibration passes from the frames", unit="emitter")
+    slope_default: i4 = register("power-on slope K", unit="count/256", range=SLOPES)
+    friction_default: i4 = register("power-on friction Vf", unit="count", range=COUNTS)
+    ir: i4 = register("IR term of acceleration and braking", unit="count", range=COUNTS)
+    drive_limit: i4 = register("largest drive magnitude", unit="count", range=COUNTS)
+    span_steady: u1 = register(
+        "1: ramp interval from the whole steady drive (literal), 0: from its back-EMF part", option=True
+    )
+    ack_last: u1 = register("1: the last byte of a command is acknowledged too", option=True)
+    transition: u1 = register("1: transition mode, 0: coast until the drive value reaches zero", option=True)
+    friction_jump: u1 = register("1: turn-around jumps by the friction of both directions", option=True)
+    trim: u1 = register("1: steady speed is trimmed every 16 ms", option=True)
+    overspeed_test: u1 = register("1: low speed halves the drive above 17/16 of the speed", option=True)
+    memory: u1 = register("1: the trimmed drive is kept for the next move of the same speed", option=True)
+    zero_speed_us: i4 = register("standstill: no emitter for this long", unit="us", range=(0, DEAD_US))
+    contact_us: i4 = register("contact while homing: no emitter for this long", unit="us", range=(0, DEAD_US))
+    homing_speed: i4 = register("speed value of homing", unit="1/6 in/s", range=SPEEDS)
+    homing_limit: i4 = register("drive limit of homing", unit="count", range=COUNTS)
+    run_speed: i4 = register("speed value of RUN and of the fast calibration pass", unit="1/6 in/s", range=SPEEDS)
+    print_speed: i4 = register("preselected speed value at power-on", unit="1/6 in/s", range=SPEEDS)
+    expected_width: i4 = register("travel between the frames", unit="emitter", range=(0, LARGEST_END))
+    width_tolerance: i4 = register(
+        "narrower by more than this is an obstruction", unit="emitter", range=(0, LARGEST_END)
+    )
+    calibration_margin: i4 = register(
+        "stop target of calibration passes from the frames", unit="emitter", range=(0, LARGEST_END)
+    )
     plausible: PlausibleLimits = block("limits of the identified line")
     columns: ColumnTimerParams = block("columns of a line")
 
@@ -98,9 +122,11 @@ class Receiver(Registers):
 class CommandQueue(Registers):
     """Decoded commands that wait, in order."""
 
-    operation: i4_array = register("operation code", unit="code", length=QUEUE)
-    start: i4_array = register("first argument; position of PRINT in 1/256 emitter", unit="emitter/256", length=QUEUE)
-    end: i4_array = register("second argument", unit="emitter", length=QUEUE)
+    operation: i4_array = register("operation code", unit="code", length=QUEUE, range=(0, REFUSED))
+    start: i4_array = register(
+        "first argument; position of PRINT in 1/256 emitter", unit="emitter/256", length=QUEUE, range=(0, LARGEST_START)
+    )
+    end: i4_array = register("second argument", unit="emitter", length=QUEUE, range=(0, LARGEST_END))
     first: u1 = register("index of the oldest", unit="count", range=(0, QUEUE - 1))
     waiting: u1 = register("how many wait", unit="count")
     motions: u1 = register("how many of them are motion commands", unit="count")
@@ -110,10 +136,10 @@ class Plan(Registers):
     """A motion command worked out from where the head will stand."""
 
     code: u1 = register("SB1 if the command cannot be done", unit="code")
-    direction: i1 = register("1 right, -1 left")
-    speed: i2 = register("selected speed value", unit="1/6 in/s")
-    target: i4 = register("commanded stop position", unit="emitter")
-    distance: i4 = register("distance the speed was selected from", unit="emitter")
+    direction: i1 = register("1 right, -1 left", range=(-1, 1))
+    speed: i2 = register("selected speed value", unit="1/6 in/s", range=SPEEDS)
+    target: i4 = register("commanded stop position", unit="emitter", range=PLACES)
+    distance: i4 = register("distance the speed was selected from", unit="emitter", range=(0, 2 * PLACES[1]))
     reposition: u1 = register("1: a run back for the run-up, the print follows")
 
 
@@ -124,9 +150,9 @@ class HeadComputer(Registers):
     now_us: i8 = register("time of this tick", unit="us")
     wake_us: i8 = register("time of the next timer; before it only emitters and commands matter", unit="us")
     homed: u1 = register("1 after homing")
-    width: i4 = register("measured travel between the frames", unit="emitter")
+    width: i4 = register("measured travel between the frames", unit="emitter", range=(-FAR, FAR))
 
-    emitter: i8 = register("position", unit="emitter")
+    emitter: i8 = register("position", unit="emitter", range=(-FAR, FAR))
     last_emitter_us: i8 = register("time of the last emitter, or of the start of the move", unit="us")
     interval_us: i8 = register("latest emitter interval, 0 while unknown", unit="us")
     emitter_seen: u1 = register("1 once an emitter has come in this move")
@@ -135,10 +161,10 @@ class HeadComputer(Registers):
 
     against: u2 = register("emitters in a row against the direction of the move", unit="count")
 
-    direction: i1 = register("direction of the move, 1 right, -1 left")
-    speed: i2 = register("commanded speed value", unit="1/6 in/s")
-    target: i4 = register("commanded stop position", unit="emitter")
-    expected_stop: i4 = register("where the running move will stand", unit="emitter")
+    direction: i1 = register("direction of the move, 1 right, -1 left", range=(-1, 1))
+    speed: i2 = register("commanded speed value", unit="1/6 in/s", range=SPEEDS)
+    target: i4 = register("commanded stop position", unit="emitter", range=PLACES)
+    expected_stop: i4 = register("where the running move will stand", unit="emitter", range=PLACES)
     drive: i2 = register("drive value V along the direction of motion", unit="count")
     drive_cmd: i2 = register("signed drive value put out, right positive", unit="count")
     steady: i2 = register("steady drive the ramp leads to", unit="count")
@@ -146,10 +172,12 @@ class HeadComputer(Registers):
     ramp_us: i4 = register("time per count of the ramp", unit="us")
     next_ramp_us: i8 = register("next count of the ramp", unit="us")
     next_trim_us: i8 = register("next trim", unit="us")
-    phase_start: i8 = register("position at which the present phase or window began", unit="emitter")
-    start_emitters: i4 = register("emitters of the low-speed start", unit="emitter")
+    phase_start: i8 = register(
+        "position at which the present phase or window began", unit="emitter", range=(-FAR, FAR)
+    )
+    start_emitters: i4 = register("emitters of the low-speed start", unit="emitter", range=(0, LARGEST_END))
 
-    maximum: i2 = register("preselected maximum print speed value", unit="1/6 in/s")
+    maximum: i2 = register("preselected maximum print speed value", unit="1/6 in/s", range=SPEEDS)
     right: IdentifiedLine = block("identified line moving right")
     left: IdentifiedLine = block("identified line moving left")
     kept_speed_right: i2 = register("speed value the kept drive belongs to, 0 none", unit="1/6 in/s")
@@ -157,9 +185,9 @@ class HeadComputer(Registers):
     kept_speed_left: i2 = register("speed value the kept drive belongs to, 0 none", unit="1/6 in/s")
     kept_drive_left: i2 = register("kept drive moving left", unit="count")
 
-    operation: u1 = register("running command", unit="code")
-    start: i4 = register("its first argument", unit="emitter/256")
-    end: i4 = register("its second argument", unit="emitter")
+    operation: u1 = register("running command", unit="code", range=(0, REFUSED))
+    start: i4 = register("its first argument", unit="emitter/256", range=(0, LARGEST_START))
+    end: i4 = register("its second argument", unit="emitter", range=(0, LARGEST_END))
     repositioning: u1 = register("1 during the run back of a print command")
     repositioned: u1 = register("1 after it")
     latched_position: u2 = register("position latched by POSITION HIGH", unit="emitter")
@@ -167,8 +195,8 @@ class HeadComputer(Registers):
 
     calibration_pass: u1 = register("0 none, 1 left fast, 2 right fast, 3 left slow, 4 right slow")
     window_us: i8 = register("end of the running calibration window", unit="us")
-    windows: i4 = register("complete windows of this pass", unit="count")
-    window_total: i8 = register("emitters of the windows of this pass", unit="emitter")
+    windows: i4 = register("complete windows of this pass", unit="count", range=(-1, WINDOWS))
+    window_total: i8 = register("emitters of the windows of this pass", unit="emitter", range=(-LONGEST, LONGEST))
 
     moves: i8 = register("moves begun", unit="count")
     turn_arounds: i8 = register("turn-arounds without a stop", unit="count")

@@ -29,6 +29,7 @@ from detent.control.speed_selection import HIGH_SPEED
 from detent.kernel.step import step
 
 TRIM_US = 16_000
+LONG = 1 << 15  # emitter interval [us] that is slow at any speed value: slower than 20000/s, and than 320000/17 s
 
 
 @step
@@ -196,8 +197,11 @@ def put_braking(p: HeadParams, c: HeadComputer) -> None:
 
 @step
 def growing_interval(c: HeadComputer) -> int:
-    """Latest emitter interval, or the time since that emitter once it is longer: a head that stands is not fast."""
-    return max(c.interval_us, c.now_us - c.last_emitter_us)
+    """Latest emitter interval, or the time since that emitter once it is longer: a head that stands is not fast.
+
+    A longer one than `LONG` compares as that.
+    """
+    return min(max(c.interval_us, c.now_us - c.last_emitter_us), LONG)
 
 
 @step
@@ -253,7 +257,7 @@ def ramp_down(p: HeadParams, c: HeadComputer) -> None:
 @step
 def speed_reached(c: HeadComputer) -> bool:
     """Second exit of the ramp: a measured emitter interval not above 20000/s us."""
-    return 0 < c.interval_us * c.speed <= 20_000
+    return 0 < c.interval_us <= LONG and 0 < c.interval_us * c.speed <= 20_000
 
 
 @step

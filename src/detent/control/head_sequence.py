@@ -19,6 +19,7 @@ from detent.control.head_computer import (
     BACKWARD,
     CALCULATE,
     DEAD_US,
+    FAR,
     FAULT,
     HIGH_ACCEL,
     HIGH_REVERSE,
@@ -44,6 +45,7 @@ from detent.control.head_computer import (
     SLOWEST_PASS,
     STALL_MARGIN,
     STALL_US,
+    WINDOWS,
     HeadComputer,
     HeadParams,
     is_motion,
@@ -59,7 +61,7 @@ from detent.control.head_motion import (
     put_drive,
 )
 from detent.control.latch import pass_on, send
-from detent.control.self_identification import identify
+from detent.control.self_identification import LONGEST, identify
 from detent.control.speed_selection import HIGH_SPEED
 from detent.kernel.step import bounded, hot_step, step
 
@@ -202,11 +204,12 @@ def window_timer(c: HeadComputer) -> None:
         c.phase_start = c.emitter
         if c.calibration_pass <= PASS_FAST_RIGHT:
             c.window_us += FAST_WINDOW_US
-            c.window_total = passed
+            total = passed
         else:
             c.window_us += SLOW_WINDOW_US
-            c.window_total = c.window_total + passed if c.windows >= 0 else 0
-        c.windows += 1
+            total = c.window_total + passed if c.windows >= 0 else 0
+        c.window_total = min(max(total, -LONGEST), LONGEST)
+        c.windows = min(c.windows + 1, WINDOWS)
 
 
 @step
@@ -301,7 +304,7 @@ def at_zero_speed(p: HeadParams, c: HeadComputer) -> None:
 @hot_step
 def on_emitter(p: HeadParams, c: HeadComputer, when: int, change: int) -> None:
     """Emitter interrupt: `when` in microseconds, `change` 1 right or -1 left."""
-    c.emitter += change
+    c.emitter = min(max(c.emitter + change, -FAR), FAR)
     c.interval_us = when - c.last_emitter_us if c.emitter_seen and change == c.last_step else 0
     c.last_emitter_us = when
     c.emitter_seen = 1

@@ -18,8 +18,8 @@ from detent.export.unit import LARGE, ControlUnit, every, members
 from detent.export.vectors import Golden
 from detent.kernel.registers import Field, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
 from detent.translate.program import Function, Program
-from detent.translate.text import code_text, comment_of, signals_text, struct_texts
-from detent.translate.values import Value, c_field, interval_of, number, type_of_local
+from detent.translate.text import FLASH_INCLUDE, code_text, comment_of, signals_text, struct_texts
+from detent.translate.values import Value, c_field, interval_of, number, type_of_local, unsigned
 
 FLAGS = "-std=c99 -ffp-contract=off"
 PROCESSORS = {
@@ -205,8 +205,11 @@ def range_checks(program: Program, params: Registers) -> Iterator[dict[str, Any]
             continue
         place, (lo, hi) = row.expression + ("[k]" if row.length else ""), field.range
         least, most = (-math.inf, math.inf) if width.is_float else interval_of(width)
-        parts = [f"({place} >= {number(lo).text})"] if lo > least else []
-        parts += [f"({place} <= {number(hi).text})"] if hi < most else []
+        ends = [number(lo), number(hi)]
+        if not width.is_float and not width.is_signed:
+            ends = [unsigned(one) for one in ends]
+        parts = [f"({place} >= {ends[0].text})"] if lo > least else []
+        parts += [f"({place} <= {ends[1].text})"] if hi < most else []
         if parts:
             yield {"text": " && ".join(parts), "number": row.number + 1, "length": row.length}
 
@@ -242,6 +245,7 @@ def texts(  # noqa: PLR0913 - what the files tell of
         "about": about, "tick": tick, "large": LARGE,
         "source_hash": source_hash, "axis_hash": short_hash(bytes(params)), "layout_hash": f"{unit.layout_hash:08X}",
         "structs": struct_texts(program, (unit.params, unit.controller, unit.lines)), "signals": signals_text(program),
+        "flash": FLASH_INCLUDE if f"#define {name.upper()}_FLASH" in signals_text(program) else "",
         "prototypes": "".join(_prototype(program, f) for f in program.steps.values() if f.entry),
         "code": code, "checks": list(range_checks(program, params)), "floats": floats, "images": list(images.items()),
     }  # fmt: skip

@@ -21,7 +21,8 @@ HOST = f"{FLAGS} -w -DON_HOST -I."
 CHANGES = (
     (r" < ", " <= "), (r" > ", " >= "), (r" <= ", " < "), (r" >= ", " > "), (r" == ", " != "), (r" != ", " == "),
     (r" \+ ", " - "), (r" - ", " + "), (r" \* ", " + "), (r" && ", " || "), (r" \|\| ", " && "),
-    (r"(?<=[ (])(\d+)(?=[;)])", None),
+    (r"(?<=_wrap_)add(?=_)", "sub"), (r"(?<=_wrap_)sub(?=_)", "add"), (r"(?<=_wrap_)mul(?=_)", "add"),
+    (r"(?<=[ (])(\d+)(?=U?[;)])", None),
 )  # fmt: skip
 """Relations, signs, and/or, constants by one (None)."""
 

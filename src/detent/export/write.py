@@ -24,6 +24,7 @@ from detent.export.code import (
     texts,
 )
 from detent.export.drawn import FILES, ROUNDS, Chance, drawn_vectors
+from detent.export.misra import DEVIATIONS
 from detent.export.serial import serial_texts
 from detent.export.unit import ControlUnit, options_of, outside_ranges, refuse_floats, unit_of
 from detent.export.vectors import FORMATS, Golden, record
@@ -159,6 +160,7 @@ def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[st
         "signals": [one.width.code for one in signals_of(golden.unit, program) if one.width],
         "image": sum(leaf.width.size * max(leaf.length, 1) for leaf in golden.unit.leaves),
         "functions": len(program.order), "tick": axis.simulated.tick,
+        "misra deviations": DEVIATIONS,
         "entries": {f.cname: {"loops": loops_of(program, f)} for f in program.order if f.entry},
         "not proven": {
             "ranges that only their declaration says": sorted(f"{w}: {t}" for w, t in program.notes.claims),

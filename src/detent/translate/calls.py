@@ -14,10 +14,8 @@ from detent.translate.values import (
     LOWEST,
     RefusedError,
     Value,
-    as_real,
     as_truth,
     as_whole,
-    cast,
     join,
     number,
     outside_language,
@@ -85,7 +83,7 @@ class Calls(Expressions):
                 raise outside_language(node, f"{ast.unparse(node)}, whose {name} is another", "hand over what it takes")
             return value.text
         if wanted is not None and wanted.kind == "float":
-            return as_real(value).text
+            return self.as_real(value).text
         if wanted is not None and wanted.kind == "bool":
             return as_truth(value).text
         value = as_whole(value)
@@ -100,7 +98,7 @@ class Calls(Expressions):
             g.names[name] = made
             self.program.changed = True
         # An entry takes the width of its declaration, any other step a type to compute in.
-        return cast(value, wanted.ctype if g.entry and wanted is not None else type_of_local(g.names[name])).text
+        return self.cast(value, wanted.ctype if g.entry and wanted is not None else type_of_local(g.names[name])).text
 
     # ---- functions that are known
 
@@ -111,7 +109,7 @@ class Calls(Expressions):
 
     def k_sqrt(self, node: ast.Call) -> Value:
         """Square root, which is rounded correctly everywhere."""
-        return real(f"sqrt({as_real(self._one(node)).text})")
+        return real(f"sqrt({self.as_real(self._one(node)).text})")
 
     def k_floor(self, node: ast.Call) -> Value:
         """Whole number below."""
@@ -139,7 +137,7 @@ class Calls(Expressions):
 
     def k_float(self, node: ast.Call) -> Value:
         """The same number as a float."""
-        return as_real(self._one(node))
+        return self.as_real(self._one(node))
 
     def k_bool(self, node: ast.Call) -> Value:
         """A truth value; what is only unlikely is as true."""
@@ -167,9 +165,9 @@ class Calls(Expressions):
             return self.extreme(name, values)
         if not all(one.kind in ("int", "float") for one in values):
             raise outside_language(node, f"{name} of no numbers", "use numbers")
-        text = as_real(values[0]).text
+        text = self.as_real(values[0]).text
         for one in values[1:]:
-            text = f"{self.helper(f'{name}_f8', '')}({text}, {as_real(one).text})"
+            text = f"{self.helper(f'{name}_f8', '')}({text}, {self.as_real(one).text})"
         return real(text)
 
     def k_min(self, node: ast.Call) -> Value:
@@ -183,11 +181,11 @@ class Calls(Expressions):
     def k_power_of_two(self, node: ast.Call) -> Value:
         """Two to a whole power, by the bits of its exponent."""
         value = as_whole(self._one(node))
-        return real(f"{self.helper('power_of_two', '')}({cast(value, 'int64_t').text})")
+        return real(f"{self.helper('power_of_two', '')}({self.cast(value, 'int64_t').text})")
 
     def k_bits_of(self, node: ast.Call) -> Value:
         """The bits of a float."""
-        text = f"{self.helper('bits_of', '')}({as_real(self._one(node)).text})"
+        text = f"{self.helper('bits_of', '')}({self.as_real(self._one(node)).text})"
         return whole(text, "int64_t", LOWEST, HIGHEST)
 
 

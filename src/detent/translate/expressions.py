@@ -13,16 +13,14 @@ from detent.translate.values import (
     RANK,
     SUM,
     UNARY,
+    UNSIGNED,
     RefusedError,
     Table,
     Value,
-    as_real,
     as_truth,
     as_whole,
     bits_of,
-    brought_to,
     c_field,
-    cast,
     decided,
     in_brackets,
     interval_of,
@@ -31,6 +29,7 @@ from detent.translate.values import (
     real,
     truth,
     type_of_local,
+    unsigned,
     whole,
 )
 
@@ -62,18 +61,20 @@ class Expressions(Integers):
         if value.kind in ("file", "array", "signal") or value.is_constant or value.truth is not None:
             return value
         name, ctype = self.temporary(), type_of_local(value)
-        text = cast(value, ctype).text if value.kind == "int" else value.text
+        text = self.cast(value, ctype).text if value.kind == "int" else value.text
         self.pre.append(f"const {ctype} {name} = {text};")
-        return replace(value, text=name, level=ATOM, ctype=ctype)
+        return replace(value, text=name, level=ATOM, ctype=ctype, of=None)
 
     def ordered(self, nodes: list[ast.expr]) -> list[Value]:
-        """Values from left to right: what stands beside a call that writes is kept before it."""
+        """Values from left to right: what stands beside a call that writes is kept before it, as is its result."""
         impure = [self.is_impure(node) for node in nodes]
+        reads = [any(isinstance(x, ast.Attribute | ast.Subscript | ast.Call) for x in ast.walk(n)) for n in nodes]
         values: list[Value] = []
         for k, node in enumerate(nodes):
             value = self.expr(node)
             later, earlier = any(impure[k + 1 :]), any(impure[:k])
-            if len(nodes) > 1 and not isinstance(node, ast.Constant) and (later or (impure[k] and earlier)):
+            beside = later or (impure[k] and (earlier or any(reads[k + 1 :])))
+            if beside and len(nodes) > 1 and not isinstance(node, ast.Constant):
                 if self.guarded:
                     raise RefusedError("FW10", node, "a call that writes beside what reads", "one of them", ORDER)
                 value = self.keep(value)
@@ -130,8 +131,7 @@ class Expressions(Integers):
         if table is not None:
             return array_of(table, "array")
         if found.length:
-            trusted = found.range if registers in self.program.fixed else None
-            return Value(kind="array", text=place, width=found.width, length=found.length, within=trusted)
+            return Value(kind="array", text=place, width=found.width, length=found.length, within=found.range)
         fixed = self.program.options.get((registers, found.name))
         if fixed is not None:
             return number(fixed)
@@ -190,14 +190,14 @@ class Expressions(Integers):
         """An operator between two numbers."""
         a, b = (as_whole(one) for one in self.ordered([node.left, node.right]))
         if isinstance(node.op, ast.Div):
-            a, b = as_real(a), as_real(b)
-            return real(f"{in_brackets(a, PRODUCT)} / {in_brackets(b, UNARY)}", PRODUCT)
+            a, b = self.as_real(a), self.as_real(b)
+            return real(f"{self.beside(a, PRODUCT)} / {in_brackets(b, UNARY)}", PRODUCT)
         if "float" in (a.kind, b.kind):
             if type(node.op) not in REAL_SIGNS:
                 raise outside_language(node, f"{type(node.op).__name__} of floats", "use + - * /")
             sign, level = REAL_SIGNS[type(node.op)]
-            a, b = as_real(a), as_real(b)
-            return real(f"{in_brackets(a, level)} {sign} {in_brackets(b, level - 1)}", level)
+            a, b = self.as_real(a), self.as_real(b)
+            return real(f"{self.beside(a, level)} {sign} {in_brackets(b, UNARY)}", level)
         if not a.kind == b.kind == "int":
             raise outside_language(node, f"an operator of {a.kind} and {b.kind}", "use numbers")
         return self.integer(node, a, b)
@@ -223,7 +223,7 @@ class Expressions(Integers):
     def e_BoolOp(self, node: ast.BoolOp) -> Value:  # noqa: N802
         """``and`` and ``or`` of truth values; each part knows that those before it held, or did not."""
         both = isinstance(node.op, ast.And)
-        before, mark, parts = self.facts.copy(), len(self.pre), list[str]()
+        before, mark, parts = self.facts.copy(), len(self.pre), list[Value]()
         for k, one in enumerate(node.values):
             self.guarded += k > 0
             value = as_truth(self.expr(one))
@@ -233,9 +233,9 @@ class Expressions(Integers):
             mark = len(self.pre)
             self.suppose(one, holds=both)
             if value.truth is None:
-                parts.append(in_brackets(value, UNARY))
+                parts.append(value)
             elif value.truth != both:  # it decides
-                parts = [*parts, value.text] if parts else []
+                parts = [*parts, value] if parts else []
                 if not parts:
                     self.facts = before
                     return decided(not both)
@@ -245,10 +245,10 @@ class Expressions(Integers):
             self.written()
         return self._linked(both, parts) if parts else decided(both)
 
-    def _linked(self, both: bool, parts: list[str]) -> Value:  # noqa: FBT001 - a truth value
+    def _linked(self, both: bool, parts: list[Value]) -> Value:  # noqa: FBT001 - a truth value
         if len(parts) == 1:
-            return truth(parts[0], UNARY)
-        return truth((" && " if both else " || ").join(parts))
+            return parts[0]
+        return truth((" && " if both else " || ").join(in_brackets(one, UNARY) for one in parts))
 
     def e_IfExp(self, node: ast.IfExp) -> Value:  # noqa: N802
         """``a if test else b``."""
@@ -280,13 +280,15 @@ class Expressions(Integers):
             return replace(a, text=f"({test.text}) ? {a.text} : {b.text}", level=ANY + 1)
         a, b = as_whole(a), as_whole(b)
         if "float" in (a.kind, b.kind):
-            a, b = as_real(a), as_real(b)
-            return real(f"({test.text}) ? {in_brackets(a, SUM)} : {in_brackets(b, SUM)}", ANY + 1)
+            a, b = self.as_real(a), self.as_real(b)
+            return real(f"({test.text}) ? {in_brackets(a, UNARY)} : {in_brackets(b, UNARY)}", ANY + 1)
         if not a.kind == b.kind == "int":
             raise outside_language(node, f"a choice between {a.kind} and {b.kind}", "choose between numbers")
         lo, hi = min(a.lo, b.lo), max(a.hi, b.hi)
-        ctype, (a, b) = brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
-        return whole(f"({test.text}) ? {in_brackets(a, SUM)} : {in_brackets(b, SUM)}", ctype, lo, hi, ANY + 1)
+        ctype, (a, b) = self.brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
+        if a.literal and b.literal:  # numbers are of the least type that holds them (MISRA C 10.6)
+            a = self.converted(a, ctype)
+        return whole(f"({test.text}) ? {in_brackets(a, UNARY)} : {in_brackets(b, UNARY)}", ctype, lo, hi, ANY + 1)
 
     # ---- comparisons
 
@@ -327,8 +329,8 @@ class Expressions(Integers):
         if op not in SIGNS:
             raise outside_language(node, f"the comparison {op.__name__}", "use < <= > >= == != in")
         if "float" in (a.kind, b.kind):
-            a, b = as_real(a), as_real(b)
-            return truth(f"{in_brackets(a, SUM)} {SIGNS[op]} {in_brackets(b, SUM)}")
+            a, b = self.as_real(a), self.as_real(b)
+            return truth(f"{in_brackets(a, UNARY)} {SIGNS[op]} {in_brackets(b, UNARY)}")
         if a.kind == b.kind == "bool" and a.truth is None and b.truth is None:
             return truth(f"{in_brackets(a, UNARY)} {SIGNS[op]} {in_brackets(b, UNARY)}")
         a, b = as_whole(a), as_whole(b)
@@ -338,11 +340,14 @@ class Expressions(Integers):
         if settled is not None:
             return decided(settled)
         beside = a if b.literal and b.lo >= 0 else b if a.literal and a.lo >= 0 else None
-        if beside is not None and beside.lo >= 0 and RANK[beside.ctype] < 32:  # whether its type has a sign or not
-            return truth(f"{in_brackets(a, SUM)} {SIGNS[op]} {in_brackets(b, SUM)}")
-        bits = 64 if RANK[a.ctype] == 64 or RANK[b.ctype] == 64 else bits_of(a.lo, a.hi, b.lo, b.hi)
-        _, (a, b) = brought_to(bits, a, b)
-        return truth(f"{in_brackets(a, SUM)} {SIGNS[op]} {in_brackets(b, SUM)}")
+        if beside is not None and beside.ctype in UNSIGNED:
+            a, b = (unsigned(one) if one.literal else one for one in (a, b))
+        elif beside is not None and beside.lo >= 0 and RANK[beside.ctype] < 32:
+            pass
+        elif not {a.ctype, b.ctype} <= UNSIGNED or (a.ctype != b.ctype and (a.is_composite or b.is_composite)):
+            bits = 64 if RANK[a.ctype] == 64 or RANK[b.ctype] == 64 else bits_of(a.lo, a.hi, b.lo, b.hi)
+            _, (a, b) = self.brought_to(bits, a, b)
+        return truth(f"{in_brackets(a, UNARY)} {SIGNS[op]} {in_brackets(b, UNARY)}")
 
 
 def array_of(table: Table, kind: str) -> Value:

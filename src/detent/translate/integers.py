@@ -5,6 +5,7 @@ step wraps. Nothing relies on what C leaves to the compiler.
 """
 
 import ast
+from dataclasses import replace
 from typing import Any
 
 from detent.translate.known import Known
@@ -15,17 +16,19 @@ from detent.translate.values import (
     PRODUCT,
     SUM,
     UNARY,
+    UNSIGNED,
     RefusedError,
     Value,
     bits_of,
-    brought_to,
-    cast,
     in_brackets,
+    number,
     outside_language,
+    unsigned,
     whole,
 )
 
-SUFFIXES = {"int64_t": "i64", "int32_t": "i32", "int": "int"}  # of helpers that exist for several types
+WRAPPED = {"+": "add", "-": "sub", "*": "mul"}
+BITS = {"uint8_t": 8, "uint16_t": 16, "uint32_t": 32}
 LONGEST: dict[type[ast.operator], int] = {ast.LShift: 62, ast.RShift: 63}  # shift that is defined in 64 bits
 
 
@@ -44,24 +47,30 @@ class Integers(Known):
         if self.final:
             self.program.notes.wraps.add((self.f.where(node), f"{why}: {ast.unparse(node)}"))
 
-    def helper(self, name: str, ctype: str) -> str:
-        """Name of a function that every program has which needs it."""
-        made = f"{name}_{SUFFIXES[ctype]}" if ctype else name
-        self.program.notes.helpers.add(made)
-        return f"{self.program.name}_{made}"
+    def beside(self, value: Value, level: int) -> str:
+        """Text of a left operand: in brackets but for a chain of operators of one kind."""
+        return value.text if value.level == level else in_brackets(value, UNARY)
+
+    def wrapped(self, sign: str, a: Value, b: Value) -> Value:
+        """What may go beyond 64 bits: computed without a sign there, and taken back."""
+        texts = ", ".join(self.cast(one, "int64_t").text for one in (a, b))
+        operation = self.helper(f"wrap_{WRAPPED[sign]}", "int64_t")
+        return replace(whole(f"{operation}({texts})", "int64_t", LOWEST, HIGHEST), of=(sign, a, b))
 
     def _sum(self, node: ast.AST, sign: str, level: int, a: Value, b: Value, ends: tuple[int, int]) -> Value:  # noqa: PLR0913
         lo, hi = ends
         bits = bits_of(lo, hi, a.lo, a.hi, b.lo, b.hi)
         if bits == 128:
             self.wraps(node, "may go beyond 64 bits")
-            text = f"(int64_t)((uint64_t){in_brackets(a, UNARY)} {sign} (uint64_t){in_brackets(b, UNARY)})"
-            return whole(text, "int64_t", LOWEST, HIGHEST, UNARY)
-        ctype, (a, b) = brought_to(bits, a, b)
-        return whole(f"{in_brackets(a, level)} {sign} {in_brackets(b, level - 1)}", ctype, lo, hi, level)
+            return self.wrapped(sign, a, b)
+        of = (sign, a, b)
+        ctype, (a, b) = self.brought_to(bits, a, b)
+        return replace(whole(f"{self.beside(a, level)} {sign} {in_brackets(b, UNARY)}", ctype, lo, hi, level), of=of)
 
     def i_Add(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802 - as the syntax tree has it
         """``a + b``."""
+        if b.literal and b.lo == 0:
+            return a
         return self._sum(node, "+", SUM, a, b, (a.lo + b.lo, a.hi + b.hi))
 
     def i_Sub(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802
@@ -81,18 +90,18 @@ class Integers(Known):
         if hi > HIGHEST:
             self.wraps(node, "may go beyond 64 bits")
             lo, hi = LOWEST, HIGHEST
-        ctype, (a, b) = brought_to(bits_of(a.lo, a.hi, b.lo, b.hi, lo, hi), a, b)
+        ctype, (a, b) = self.brought_to(bits_of(a.lo, a.hi, b.lo, b.hi, lo, hi), a, b)
         if a.lo >= 0 and b.lo > 0:
-            return whole(f"{in_brackets(a, PRODUCT)} / {in_brackets(b, UNARY)}", ctype, lo, hi, PRODUCT)
+            return whole(f"{self.beside(a, PRODUCT)} / {in_brackets(b, UNARY)}", ctype, lo, hi, PRODUCT)
         return whole(f"{self.helper('floor_div', ctype)}({a.text}, {b.text})", ctype, lo, hi)
 
     def i_Mod(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802
         """``a % b``: with the sign of the divisor; 0 for a divisor 0."""
         del node
         lo, hi = min(0, b.lo + 1), max(0, b.hi - 1)
-        ctype, (a, b) = brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
+        ctype, (a, b) = self.brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
         if a.lo >= 0 and b.lo > 0:
-            return whole(f"{in_brackets(a, PRODUCT)} % {in_brackets(b, UNARY)}", ctype, 0, min(hi, a.hi), PRODUCT)
+            return whole(f"{self.beside(a, PRODUCT)} % {in_brackets(b, UNARY)}", ctype, 0, min(hi, a.hi), PRODUCT)
         return whole(f"{self.helper('floor_mod', ctype)}({a.text}, {b.text})", ctype, lo, hi)
 
     def _check_shift(self, node: ast.BinOp, b: Value) -> tuple[int, int]:
@@ -112,30 +121,34 @@ class Integers(Known):
         if bits == 128:
             self.wraps(node, "may go beyond 64 bits")
             bits, lo, hi = 64, LOWEST, HIGHEST
-        ctype, (a,) = brought_to(bits, a)
-        unsigned = "unsigned" if ctype == "int" else f"u{ctype}"
-        return whole(f"({ctype})(({unsigned}){in_brackets(a, UNARY)} << {in_brackets(b, UNARY)})", ctype, lo, hi, UNARY)
+        ctype, (a,) = self.brought_to(bits, a)
+        text = f"{self.helper('shift_left', ctype)}({a.text}, {self._count_of(b)})"
+        return whole(text, ctype, lo, hi)
+
+    def _count_of(self, value: Value) -> str:
+        """By how much to shift, without a sign."""
+        if value.literal:
+            return value.text
+        plain = value.ctype in UNSIGNED and not value.is_composite
+        return (value if plain else self.converted(value, "unsigned")).text
 
     def i_RShift(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802
         """``a >> b``, rounded down whatever the compiler does with a sign."""
         corners = [x >> n for x in (a.lo, a.hi) for n in self._check_shift(node, b)]
         # In C a shift by the width or more is not defined: 32 bits only where the count is below that.
         bits = max(bits_of(a.lo, a.hi), 16 if b.hi < 16 else 32 if b.hi < 32 else 64)
-        ctype, (a,) = brought_to(bits, a)
-        if a.lo >= 0:
-            # Without a sign in its way, a shift by a byte or more costs a small processor a copy.
-            first = f"(unsigned){in_brackets(a, UNARY)}" if ctype == "int" and b.lo >= 8 else in_brackets(a, UNARY)
-            text = f"{first} >> {in_brackets(b, UNARY)}"
-            if ctype == "int" and b.lo >= 8:
-                return whole(f"(int)({text})", ctype, min(corners), max(corners), UNARY)
-            return whole(text, ctype, min(corners), max(corners), ANY)
-        text = f"{self.helper('shift_right', ctype)}({a.text}, {cast(b, 'int32_t').text})"
+        ctype, (a,) = self.brought_to(bits, a)
+        way = "shift_down" if a.lo >= 0 else "shift_right"
+        text = f"{self.helper(way, ctype)}({a.text}, {self._count_of(b)})"
         return whole(text, ctype, min(corners), max(corners))
 
     def _bitwise(self, sign: str, a: Value, b: Value, lo: int, hi: int) -> Value:
-        ctype, (a, b) = brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
-        # With a sign in it, C's small types would give another type than that of the result.
-        return whole(f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}", ctype, lo, hi, ANY)
+        of, ctype = (sign, a, b), _type_without_sign(a, b)
+        if ctype:
+            a, b = (unsigned(one) if one.literal else one for one in (a, b))
+        else:  # with a sign in it, C's small types would give another type than that of the result
+            ctype, (a, b) = self.brought_to(bits_of(a.lo, a.hi, b.lo, b.hi), a, b)
+        return replace(whole(f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}", ctype, lo, hi, ANY), of=of)
 
     def i_BitAnd(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802
         """``a & b``."""
@@ -159,10 +172,10 @@ class Integers(Known):
         bits = bits_of(-value.hi, -value.lo, value.lo, value.hi)
         if bits == 128:
             self.wraps(node, "may go beyond 64 bits")
-            text = f"(int64_t)(UINT64_C(0) - (uint64_t){in_brackets(value, UNARY)})"
-            return whole(text, "int64_t", LOWEST, HIGHEST, UNARY)
-        ctype, (value,) = brought_to(bits, value)
-        return whole(f"-{in_brackets(value, 0)}", ctype, -value.hi, -value.lo, UNARY)
+            return self.wrapped("-", number(0), value)
+        of = ("-", number(0), value)
+        ctype, (value,) = self.brought_to(bits, value)
+        return replace(whole(f"-{in_brackets(value, 0)}", ctype, -value.hi, -value.lo, UNARY), of=of)
 
     def magnitude(self, node: ast.AST, value: Value) -> Value:
         """``abs(value)``."""
@@ -171,7 +184,7 @@ class Integers(Known):
         if hi > HIGHEST:
             self.wraps(node, "may go beyond 64 bits")
             lo, hi = LOWEST, HIGHEST
-        ctype, (value,) = brought_to(bits_of(lo, hi, value.lo, value.hi), value)
+        ctype, (value,) = self.brought_to(bits_of(lo, hi, value.lo, value.hi), value)
         return whole(f"{self.helper('abs', ctype)}({value.text})", ctype, lo, hi)
 
     def extreme(self, name: str, values: list[Value]) -> Value:
@@ -180,9 +193,17 @@ class Integers(Known):
         first, *others = values
         for other in others:
             lo, hi = of(first.lo, other.lo), of(first.hi, other.hi)
-            ctype, (a, b) = brought_to(bits_of(first.lo, first.hi, other.lo, other.hi), first, other)
+            ctype, (a, b) = self.brought_to(bits_of(first.lo, first.hi, other.lo, other.hi), first, other)
             first = whole(f"{self.helper(name, ctype)}({a.text}, {b.text})", ctype, lo, hi)
         return first
+
+
+def _type_without_sign(a: Value, b: Value) -> str:
+    """The type of both operands where they have no sign and one type; a number has any that holds it."""
+    known = {one.ctype for one in (a, b) if not one.literal}
+    ctype = known.pop() if len(known) == 1 else ""
+    fits = all(0 <= one.lo <= one.hi < 1 << BITS.get(ctype, 0) for one in (a, b) if one.literal)
+    return ctype if ctype in BITS and fits else ""
 
 
 def _of_same_bits(a: Value, b: Value) -> tuple[int, int]:

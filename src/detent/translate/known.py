@@ -11,11 +11,34 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from detent.translate.values import RefusedError, Value, number, outside_language
+from detent.translate.values import (
+    ANY,
+    ATOM,
+    PRODUCT,
+    RANK,
+    SUM,
+    TYPES,
+    UNARY,
+    UNSIGNED,
+    RefusedError,
+    Value,
+    as_whole,
+    bits_of,
+    in_brackets,
+    number,
+    outside_language,
+    real,
+    unsigned,
+    whole,
+)
 
 if TYPE_CHECKING:
     from detent.translate.program import Function, Program
 
+SUFFIXES = {"int64_t": "i64", "int32_t": "i32", "int": "int"}  # of helpers that exist for several types
+SHORT = SUFFIXES | {
+    "int8_t": "i8", "int16_t": "i16", "uint8_t": "u8", "uint16_t": "u16", "uint32_t": "u32", "unsigned": "unsigned"
+}  # fmt: skip
 FLIPPED: dict[Any, Any] = {
     ast.Lt: ast.Gt,
     ast.LtE: ast.GtE,
@@ -107,6 +130,88 @@ class Known:
         if method is None:
             raise outside_language(node, f"the expression {type(node).__name__}", "write it with what a step may hold")
         return method(node)
+
+    # ---- types
+
+    def helper(self, name: str, ctype: str) -> str:
+        """Name of a function that every program has which needs it."""
+        made = f"{name}_{SUFFIXES[ctype]}" if ctype else name
+        self.program.notes.helpers.add(made)
+        return f"{self.program.name}_{made}"
+
+    def converted(self, value: Value, ctype: str) -> Value:
+        """An integer in another type that holds it: by a cast, or by a function where it is an operator's result.
+
+        Of a result whose lower bits are enough, or whose operands have no sign, the operands are converted instead.
+        """
+        bits, before = 32 if ctype == "uint32_t" else 16, value.ctype
+        if value.is_composite and value.of is not None and (ctype in UNSIGNED) != (before in UNSIGNED):
+            if before in UNSIGNED:
+                sign, *operands = value.of
+                ends = [end for one in operands for end in (one.lo, one.hi)]
+                made, (a, b) = self.brought_to(bits_of(*ends), *operands)
+                text = f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}"
+                value = replace(value, text=text, ctype=made, of=None)
+            elif RANK[before] >= bits:
+                value = self.modular(value, bits)
+            if value.ctype == ctype:
+                return value
+        if value.is_composite and (RANK[value.ctype] < RANK[ctype] or (ctype in UNSIGNED) != (value.ctype in UNSIGNED)):
+            text = f"{self.helper(f'{SHORT[ctype]}_of_{SHORT[value.ctype]}', '')}({value.text})"
+            return replace(value, text=text, ctype=ctype, level=ATOM)
+        return replace(value, text=f"({ctype}){in_brackets(value, UNARY)}", ctype=ctype, level=UNARY)
+
+    def cast(self, value: Value, ctype: str) -> Value:
+        """An integer in another type that holds it; C widens small ones by itself."""
+        if value.ctype == ctype or value.literal or (RANK[value.ctype] < RANK[ctype] and not value.is_composite):
+            return value
+        return self.converted(value, ctype)
+
+    def modular(self, value: Value, bits: int) -> Value:
+        """The lower 16 or 32 bits of an integer, without a sign: of a sum, made of those of its operands alone."""
+        ctype = {16: "unsigned", 32: "uint32_t"}[bits]
+        if value.ctype in UNSIGNED and RANK[value.ctype] <= RANK[ctype]:
+            return value
+        if value.literal and 0 <= value.lo < 1 << bits - 1:
+            return unsigned(value)
+        if value.of is None or RANK[value.ctype] < bits or value.ctype in UNSIGNED:
+            return self.converted(replace(value, of=None), ctype)
+        sign, *operands = value.of
+        level = {"+": SUM, "-": SUM, "*": PRODUCT}.get(sign, ANY)
+        a, b = (self.modular(one, bits) for one in operands)
+        if ctype not in (a.ctype, b.ctype):
+            a = self.converted(a, ctype)
+        left = a.text if a.level == level < ANY else in_brackets(a, UNARY)
+        return whole(f"{left} {sign} {in_brackets(b, UNARY)}", ctype, 0, (1 << bits) - 1, level)
+
+    def brought_to(self, bits: int, *values: Value) -> tuple[str, list[Value]]:
+        """Operands such that C computes in the type of so many bits, all of them with a sign; that type, and they."""
+        if bits == 16 and any(RANK[one.ctype] >= 32 and not one.literal for one in values):
+            bits = 32
+        ctype = TYPES[min(bits, 64)]
+        made = [
+            self.converted(one, ctype)
+            if RANK[one.ctype] > RANK[ctype] or one.ctype in UNSIGNED or (one.is_composite and one.ctype != ctype)
+            else one
+            for one in values
+        ]
+        if bits > 16 and not any(one.ctype == ctype and not (one.literal and bits == 32) for one in made):
+            k = next((n for n, one in enumerate(made) if not one.literal), 0)
+            made[k] = self.converted(made[k], ctype)
+        return ctype, made
+
+    def as_real(self, value: Value) -> Value:
+        """A number as a float, as Python takes it beside one."""
+        if value.kind == "float":
+            return value
+        if value.kind == "bool" and value.truth is None:
+            return real(f"{in_brackets(value, UNARY)} ? 1.0 : 0.0", ANY + 1)
+        value = as_whole(value)
+        if value.is_constant and bits_of(value.lo) <= 32:
+            return number(float(value.lo))
+        if value.is_composite:
+            return real(f"{self.helper(f'f64_of_{SHORT[value.ctype]}', '')}({value.text})")
+        return real(f"(double){in_brackets(value, UNARY)}", UNARY)
 
     # ---- facts
 

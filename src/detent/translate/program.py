@@ -17,14 +17,18 @@ from detent.translate.statements import Statements, names_written, targets_of
 from detent.translate.values import (
     C_WORDS,
     INTEGERS,
+    UNSIGNED_NAME,
     Notes,
     RefusedError,
     Shape,
     Value,
+    bits_of,
     interval_of,
+    number,
     real,
     truth,
     type_of_local,
+    unsigned,
     whole,
 )
 
@@ -198,6 +202,7 @@ class Program:
                 self.texts[f.py] = self._text(f)
                 waiting += [self.steps[g] for g in f.reaches]
         self.order = self._callees_first()
+        self._sign_constants()
 
     # ---- what a translation asks for
 
@@ -311,6 +316,27 @@ class Program:
     def _is_elsewhere(self, registers: type[Registers], field: Field) -> bool:
         """True for a register that is a constant in C, or a table."""
         return (registers, field.name) in self.options or (registers, field.name) in self.shape.tables
+
+    def _sign_constants(self) -> None:
+        """A number that only stands beside what has no sign has none itself; one that is nowhere is left out."""
+        every = "\n".join(self.texts.values())
+        used = {name for name, mark in re.findall(rf"\b([A-Z]\w*)({UNSIGNED_NAME})?", every) if not mark}
+        marked = set(re.findall(rf"\b([A-Z]\w*){UNSIGNED_NAME}", every))
+        alone = set[str]() if self.shape.storage else marked - used  # a header has its own numbers
+        constants = self.notes.constants
+        for name, (value, _) in list(constants.items()):
+            if name in alone:
+                constants[name] = (value, unsigned(number(value)).text)
+            elif name not in used | marked:
+                del constants[name]
+
+        def resolved(found: re.Match[str]) -> str:
+            name = found[1]
+            wide = "uint32_t" if bits_of(constants[name][0]) > 16 else "unsigned"
+            return name if name in alone else f"({wide}){name}"
+
+        for py, text in self.texts.items():
+            self.texts[py] = re.sub(rf"\b([A-Z]\w*){UNSIGNED_NAME}", resolved, text)
 
     # ---- to a fixed point
 

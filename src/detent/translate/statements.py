@@ -14,10 +14,8 @@ from detent.translate.values import (
     UNARY,
     RefusedError,
     Value,
-    as_real,
     as_truth,
     as_whole,
-    cast,
     in_brackets,
     interval_of,
     join,
@@ -25,6 +23,7 @@ from detent.translate.values import (
     outside_language,
     real,
     type_of_local,
+    unsigned,
     whole,
     widen,
 )
@@ -138,18 +137,18 @@ class Statements(Calls):
         if kind == "bool":
             value = as_truth(value)
         elif kind == "float":
-            value = as_real(value)
+            value = self.as_real(value)
         elif kind == "int":
             value = as_whole(value)
         if value.kind != kind:
             raise outside_language(node, f"a result of kind {value.kind}", f"return what is announced, {kind}")
         if kind == "int":
             old = self.f.result
-            made = join(old, replace(value, text="", level=ATOM, literal=False))
+            made = join(old, replace(value, text="", level=ATOM, literal=False, of=None))
             made = widen(old, made) if self.program.widens else made
             if old is None or (old.lo, old.hi) != (made.lo, made.hi):
                 self.f.result, self.program.changed = made, True
-            value = cast(value, type_of_local(made))
+            value = self.cast(value, type_of_local(made))
         self.flush()
         self.line(f"return {value.text};")
 
@@ -166,11 +165,13 @@ class Statements(Calls):
             body = node.body if test.truth else node.orelse
             if word == "if":
                 self.block(body)
-            elif body:
-                self.line("} else {")
+                return
+            self.line("} else {")
+            if body:
                 self.inside(body)
-            if word != "if":
-                self.line("}")
+            else:
+                self.line("    /* nothing */")
+            self.line("}")
             return
         self.line(f"{word} ({test.text}) {{")
         before = self.facts.copy()
@@ -184,6 +185,9 @@ class Statements(Calls):
             if node.orelse:
                 self.line("} else {")
                 self.inside(node.orelse)
+            elif word != "if":
+                self.line("} else {")
+                self.line("    /* nothing */")
             self.line("}")
         if leaves_off(node.orelse) and not leaves_off(node.body):
             self.facts = after
@@ -255,10 +259,10 @@ class Statements(Calls):
         text = stop.text
         if not stop.is_constant:
             end = self.temporary()
-            self.pre.append(f"const {ctype} {end} = {cast(stop, ctype).text};")
+            self.pre.append(f"const {ctype} {end} = {self.cast(stop, ctype).text};")
             text = end
         self.flush()
-        self.line(f"for ({ctype} {name} = {cast(start, ctype).text}; {name} < {text}; {name}++) {{")
+        self.line(f"for ({ctype} {name} = {self.cast(start, ctype).text}; {name} < {text}; {name}++) {{")
         self.declared.add(name)
         self.facts.bounds[name] = (lo, hi)
         self.inside(node.body)
@@ -324,7 +328,7 @@ class Statements(Calls):
     def note(self, name: str, value: Value) -> Value:
         """A variable holds this value, too; what it is in all."""
         old = self.f.names.get(name)
-        made = join(old, replace(value, text=name, level=ATOM, truth=None, literal=False))
+        made = join(old, replace(value, text=name, level=ATOM, truth=None, literal=False, of=None))
         made = widen(old, made) if self.program.widens else made
         if made.kind == "int":
             made = replace(made, ctype=type_of_local(made))
@@ -355,7 +359,7 @@ class Statements(Calls):
             self.check_index(target, array, index)
             if array.kind == "signal" or array.width is None:
                 raise outside_language(target, f"a store to {ast.unparse(target)}", "store to registers")
-            place, width, claimed, written = f"{array.text}[{index.text}]", array.width, None, None
+            place, width, claimed, written = f"{array.text}[{index.text}]", array.width, array.within, None
         else:
             raise outside_language(target, f"a store to {ast.unparse(target)}", "store to names and registers")
         if written in self.program.fixed:
@@ -380,9 +384,9 @@ class Statements(Calls):
         value = value if value.kind != "int" or value.ctype else replace(value, ctype=type_of_local(value))
         have = self.note(target.id, value)
         if have.kind == "int":
-            text = cast(as_whole(value), type_of_local(have)).text
+            text = self.cast(as_whole(value), type_of_local(have)).text
         else:
-            text = as_real(value).text if have.kind == "float" else value.text
+            text = self.as_real(value).text if have.kind == "float" else value.text
         if target.id in self.declared:
             if text != target.id:  # what is left of a choice that was folded
                 self.line(f"{target.id} = {text};")
@@ -402,8 +406,8 @@ class Statements(Calls):
     def narrowed(self, value: Value, width: Width, claimed: tuple[float, float] | None, node: ast.AST) -> str:
         """Text of a value as a register takes it: wrapped to its width; a claim that is not proven can be checked."""
         if width.is_float:
-            return as_real(value).text
-        value = as_whole(value)
+            return self.as_real(value).text
+        given, value = value, as_whole(value)
         if value.kind != "int":
             raise outside_language(node, "a float in an integer register", "write int()")
         ctype = INTEGERS[width.code]
@@ -414,11 +418,21 @@ class Statements(Calls):
             if self.final:
                 self.program.notes.claims.add((self.f.where(node), f"the range of {ast.unparse(node)}"))
             if not self.program.shape.checks:
-                return value.text if value.ctype == ctype else f"({ctype}){in_brackets(value, UNARY)}"
+                return value.text if value.ctype == ctype else self.converted(value, ctype).text
             text = f"{self.helper('claimed', '')}({value.text}, {number(int(claimed[0])).text}, "
             return f"({ctype}){text}{number(int(claimed[1])).text})"
-        if value.ctype == ctype or (value.literal and lo <= value.lo <= hi):
+        if given.kind == "bool" and given.truth is None:
+            return f"{in_brackets(given, UNARY)} ? {'1 : 0' if width.is_signed else '1U : 0U'}"
+        if value.literal and lo <= value.lo <= hi:
+            return value.text if width.is_signed else unsigned(value).text
+        return self._in_width(value, width)
+
+    def _in_width(self, value: Value, width: Width) -> str:
+        """Text of an integer in a width: as it is, wrapped, or cast where it fits, or wraps without a sign."""
+        ctype, (lo, hi) = INTEGERS[width.code], interval_of(width)
+        if value.ctype == ctype:
             return value.text
-        if width.is_signed and not (lo <= value.lo and value.hi <= hi):
-            return f"{self.helper(f'wrap_{width.code}', '')}({value.text})"
-        return f"({ctype}){in_brackets(value, UNARY)}"
+        if width.is_signed and width.size < 8 and not (lo <= value.lo and value.hi <= hi):
+            made = self.modular(value, 16 if width.size < 4 else 32)
+            return f"{self.helper(f'wrap_{width.code}', '')}({made.text})"
+        return self.converted(value, ctype).text

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable
 
 from detent.kernel.registers import Registers
+from detent.translate.known import SHORT
 from detent.translate.program import Function, Program
 from detent.translate.values import c_field
 
@@ -17,10 +18,14 @@ HELPERS = {
         return 0;
     }}
     if (b == -1) {{
-        return ({t})(({u})0 - ({u})a);
+        const {u} bits = 0U - ({u})a;
+        return ({t})bits;
     }}
     q = a / b;
-    return (((a % b) != 0) && ((a < 0) != (b < 0))) ? (q - 1) : q;
+    if (((a % b) != 0) && ((a < 0) != (b < 0))) {{
+        q = q - 1;
+    }}
+    return q;
 }}
 """,
     "floor_mod": """{t} N(floor_mod_{c})({t} a, {t} b)
@@ -30,17 +35,53 @@ HELPERS = {
         return 0;
     }}
     m = a % b;
-    return ((m != 0) && ((m < 0) != (b < 0))) ? (m + b) : m;
+    if ((m != 0) && ((m < 0) != (b < 0))) {{
+        m = m + b;
+    }}
+    return m;
 }}
 """,
-    "shift_right": """{t} N(shift_right_{c})({t} a, int32_t n)
+    "shift_left": """{t} N(shift_left_{c})({t} a, unsigned n)
 {{
-    return (a >= 0) ? (a >> n) : ({t})~(~({u})a >> n);
+    const {u} bits = ({u})a << n;
+    return ({t})bits;
+}}
+""",
+    "shift_down": """{t} N(shift_down_{c})({t} a, unsigned n) /* a is not negative */
+{{
+    const {u} bits = ({u})a >> n;
+    return ({t})bits;
+}}
+""",
+    "shift_right": """{t} N(shift_right_{c})({t} a, unsigned n)
+{{
+    const {u} sign = (a < 0) ? ~({u})0 : ({u})0;
+    const {u} bits = ((({u})a ^ sign) >> n) ^ sign;
+    return ({t})bits;
 }}
 """,
     "abs": """{t} N(abs_{c})({t} a)
 {{
-    return (a < 0) ? ({t})(({u})0 - ({u})a) : a;
+    const {u} bits = (a < 0) ? (0U - ({u})a) : ({u})a;
+    return ({t})bits;
+}}
+""",
+    "wrap_add": """{t} N(wrap_add_{c})({t} a, {t} b)
+{{
+    const {u} bits = ({u})a + ({u})b;
+    return ({t})bits;
+}}
+""",
+    "wrap_sub": """{t} N(wrap_sub_{c})({t} a, {t} b)
+{{
+    const {u} bits = ({u})a - ({u})b;
+    return ({t})bits;
+}}
+""",
+    "wrap_mul": """{t} N(wrap_mul_{c})({t} a, {t} b)
+{{
+    const {u} bits = ({u})a * ({u})b;
+    return ({t})bits;
 }}
 """,
     "min": "{t} N(min_{c})({t} a, {t} b)\n{{\n    return (b < a) ? b : a;\n}}\n",
@@ -51,85 +92,111 @@ WHOLE_HELPERS = {
     "max_f8": "double N(max_f8)(double a, double b)\n{\n    return (b > a) ? b : a;\n}\n",
     "to_i64": """int64_t N(to_i64)(double x)
 {
-    if (x >= 9223372036854775808.0) {
-        return INT64_MAX;
+    if (fabs(x) < 9223372036854775808.0) {
+        return (int64_t)x;
     }
-    return (x >= -9223372036854775808.0) ? (int64_t)x : INT64_MIN;
+    return (x > 0.0) ? INT64_MAX : ((-INT64_MAX) - 1);
+}
+""",
+    "shift_right_i64": """int64_t N(shift_right_i64)(int64_t a, unsigned n) /* shorter than by its sign */
+{
+    const uint64_t bits = (a >= 0) ? ((uint64_t)a >> n) : ~(~(uint64_t)a >> n);
+    return (int64_t)bits;
 }
 """,
     "floor": """int64_t N(floor)(double x)
 {
-    const int64_t t = N(to_i64)(x);
-    return ((x < (double)t) && (t > INT64_MIN)) ? (t - 1) : t;
+    int64_t t = N(to_i64)(x);
+    if ((x < (double)t) && (t >= (-INT64_MAX))) {
+        t = t - 1;
+    }
+    return t;
 }
 """,
     "round": """int64_t N(round)(double x)
 {
-    const int64_t below = N(floor)(x);
+    int64_t below = N(floor)(x);
     const double rest = x - (double)below;
-    return ((rest > 0.5) || (!(rest < 0.5) && (((uint64_t)below & 1u) != 0u))) ? (below + 1) : below;
+    if ((rest > 0.5) || (!(rest < 0.5) && (((uint64_t)below & 1U) != 0U))) {
+        below = below + 1;
+    }
+    return below;
 }
 """,
     "power_of_two": """double N(power_of_two)(int64_t exponent)
 {
-    const uint64_t bits = (uint64_t)(exponent + 1023) << 52;
+    const int64_t biased = exponent + 1023;
+    const uint64_t bits = (uint64_t)biased << 52;
     double x;
-    memcpy(&x, &bits, sizeof x);
+    (void)memcpy((uint8_t *)&x, (const uint8_t *)&bits, sizeof x);
     return x;
 }
 """,
     "bits_of": """int64_t N(bits_of)(double x)
 {
     int64_t bits;
-    memcpy(&bits, &x, sizeof bits);
+    (void)memcpy((uint8_t *)&bits, (const uint8_t *)&x, sizeof bits);
     return bits;
 }
 """,
 }
-WRAP = """{t} N(wrap_{c})(int64_t value)
+WRAP = """{t} N(wrap_{c})({w} value)
 {{
     const {u} bits = ({u})value;
     return (bits > ({u}){most}) ? ({t})(-({t})({u})~bits - 1) : ({t})bits;
 }}
 """
+FLASH_INCLUDE = """#ifdef __AVR__
+#include <avr/pgmspace.h>
+#endif
+"""
 FLASH = """/* Tables, and what a host lays ready, stay in flash, also where that is another address space. */
 #ifdef __AVR__
-#include <avr/pgmspace.h>
 #define {NAME}_FLASH PROGMEM
 #ifdef __AVR_HAVE_ELPM__
-#define {NAME}_AT(type) uint_farptr_t
 #define {NAME}_TABLE(table) pgm_get_far_address(table)
-#define {NAME}_READ(bits, at, bytes, k) pgm_read_##bits##_far((at) + (uint_farptr_t)(k) * (bytes))
 #else
-#define {NAME}_AT(type) const type *
 #define {NAME}_TABLE(table) (table)
-#define {NAME}_READ(bits, at, bytes, k) pgm_read_##bits((at) + (k))
 #endif
 #else
 #define {NAME}_FLASH
-#define {NAME}_AT(type) const type *
 #define {NAME}_TABLE(table) (table)
-#define {NAME}_READ(bits, at, bytes, k) ((at)[k])
 #endif
 """
-READS = "#define {NAME}_{CODE}(at, k) (({type}){NAME}_READ({word}, at, {bytes}u, k))\n"
+READS = """#if defined(__AVR__) && defined(__AVR_HAVE_ELPM__)
+#define {NAME}_{CODE}(at, k) (({type})pgm_read_{word}_far((at) + ((uint_farptr_t)(k) * {bytes}U)))
+#elif defined(__AVR__)
+#define {NAME}_{CODE}(at, k) (({type})pgm_read_{word}(&(at)[k]))
+#else
+#define {NAME}_{CODE}(at, k) ((at)[k])
+#endif
+"""
+PLACE = """#if defined(__AVR__) && defined(__AVR_HAVE_ELPM__)
+typedef uint_farptr_t {name}_{code}_place;
+#else
+typedef const {type} *{name}_{code}_place;
+#endif
+"""
 WORDS = {1: "byte", 2: "word", 4: "dword"}
 MOST = {"i1": "INT8_MAX", "i2": "INT16_MAX", "i4": "INT32_MAX", "i8": "INT64_MAX"}
 C_TYPES = {"i1": "int8_t", "i2": "int16_t", "i4": "int32_t", "i8": "int64_t"}
 
 
-CLAIMED = """#ifdef FIRMWARE_CHECK
-{storage}int64_t N(claimed)(int64_t value, int64_t lowest, int64_t highest)
+CLAIMED = """{storage}int64_t N(claimed)(int64_t value, int64_t lowest, int64_t highest)
 {{
+#ifdef FIRMWARE_CHECK
     if ((value < lowest) || (value > highest)) {{
         __builtin_trap();
     }}
+#else
+    (void)lowest;
+    (void)highest;
+#endif
     return value;
 }}
-#else
-#define N(claimed)(value, lowest, highest) (value)
-#endif
 """
+CONVERTED = "{to} N({name})({of} value)\n{{\n    return ({to})value;\n}}\n"
+LONG = {short: ctype for ctype, short in SHORT.items()} | {"f64": "double"}
 
 
 def helper_text(name: str, prefix: str, storage: str = "static ") -> str:
@@ -139,8 +206,11 @@ def helper_text(name: str, prefix: str, storage: str = "static ") -> str:
         return re.sub(r"\bN\((\w+)\)", rf"{prefix}_\1", CLAIMED.format(storage=storage))
     if name in WHOLE_HELPERS:
         text = WHOLE_HELPERS[name]
+    elif kind.endswith("_of"):
+        text = CONVERTED.format(name=name, to=LONG[kind.removesuffix("_of")], of=LONG[of])
     elif kind == "wrap":
-        text = WRAP.format(t=C_TYPES[of], u=UNSIGNED[of], c=of, most=MOST[of])
+        wide = "uint32_t" if of == "i4" else "unsigned"
+        text = WRAP.format(t=C_TYPES[of], u=UNSIGNED[of], w=wide, c=of, most=MOST[of])
     else:
         t, u = {"i64": ("int64_t", "uint64_t"), "i32": ("int32_t", "uint32_t")}.get(of, ("int", "unsigned"))
         text = HELPERS[kind].format(t=t, u=u, c=of)
@@ -149,10 +219,20 @@ def helper_text(name: str, prefix: str, storage: str = "static ") -> str:
 
 def helpers_text(program: Program) -> str:
     """All helpers that a program needs, the ones that others call first."""
-    needed = program.notes.helpers
+    needed = _used(program)
     storage = program.shape.storage or "static "
     order = sorted(needed, key=lambda one: (one in ("floor", "round"), one))
     return "\n".join(helper_text(one, program.name, storage) for one in order)
+
+
+def _used(program: Program) -> set[str]:
+    """Helpers that the functions call, and those that these call; a sum may have been made in another way."""
+    found, waiting = set[str](), [program.texts[f.py] for f in program.order]
+    for text in waiting:
+        called = set(re.findall(rf"\b{program.name}_(\w+)\(", text)) & program.notes.helpers
+        waiting += [helper_text(one, program.name) for one in called - found]
+        found |= called
+    return found
 
 
 def comment_of(text: str) -> str:
@@ -192,11 +272,14 @@ def signals_text(program: Program) -> str:
     widths = sorted({v.width for v in laid if v.width}, key=lambda one: one.code)
     kept = {t.width for t in program.shape.tables.values()} | {one for one in widths if one.size < 8}
     parts = [FLASH.format(NAME=program.name.upper())] if kept else []
-    parts += [READS.format(NAME=program.name.upper(), CODE=one.code.upper(), type=one.c_name, bytes=one.size,
-                           word=WORDS[one.size]) for one in sorted(kept, key=lambda one: one.code)]  # fmt: skip
+    parts += [READS.format(NAME=program.name.upper(), CODE=one.code.upper(),
+                           type=one.c_name, bytes=one.size, word=WORDS[one.size])
+              for one in sorted(kept, key=lambda one: one.code)]  # fmt: skip
     parts += ["\n"] if kept else []
     for one in widths:
-        at = f"const {one.c_name} *at" if one.size == 8 else f"{program.name.upper()}_AT({one.c_name}) at"
+        at = f"const {one.c_name} *at" if one.size == 8 else f"{program.name}_{one.code}_place at"
+        if one.size < 8:
+            parts.append(PLACE.format(name=program.name, code=one.code, type=one.c_name))
         parts.append(
             f"/* What the host lays ready: where it is, and how much. */\ntypedef struct {{\n    {at};\n"
             f"    int32_t length;\n}} {program.name}_{one.code}_signal;\n\n"
@@ -220,7 +303,7 @@ def code_text(program: Program) -> str:
     constants = "".join(f"#define {name} {text}\n" for name, (_, text) in sorted(program.notes.constants.items()))
     functions = "\n".join(program.texts[f.py] for f in program.order)
     body = "\n".join(part for part in (constants, helpers_text(program), functions) if part)
-    needs_math = any(word in functions for word in ("sqrt(", "fabs(", "INFINITY"))
+    needs_math = any(word in body for word in ("sqrt(", "fabs(", "INFINITY"))
     includes = ["<math.h>"] if needs_math else []
     includes += ["<stddef.h>"] if "NULL" in functions else []
     includes += ["<string.h>"] if "memcpy(" in body else []

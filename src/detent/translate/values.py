@@ -20,6 +20,7 @@ RANK = {
     "int16_t": 15,
     "int": 16,
     "uint16_t": 17,
+    "unsigned": 17,
     "int32_t": 32,
     "uint32_t": 33,
     "int64_t": 64,
@@ -28,6 +29,9 @@ TYPES = {16: "int", 32: "int32_t", 64: "int64_t"}
 """What C computes in: `int` has 16 bits on some processors, and what fits in those is never wider there."""
 LOWEST, HIGHEST = -(1 << 63), (1 << 63) - 1  # of 64 bits
 _CALL = re.compile(r"\w\(")
+UNSIGNED = frozenset({"uint8_t", "uint16_t", "unsigned", "uint32_t"})
+UNSIGNED_NAME = "@u"
+"""Behind the name of a number of a module where an operand without a sign is beside it."""
 ATOM, UNARY, PRODUCT, SUM, ANY = 0, 1, 2, 3, 5  # how tightly a text holds together
 
 C_WORDS = frozenset({
@@ -84,13 +88,19 @@ class Value:
     width: Width | None = None  # of the elements of an array or a signal
     length: int = 0  # of an array, and of a signal that is a table
     element: str = "{text}[{index}]"  # text of an element of an array or a signal
-    within: tuple[float, float] | None = None  # range of its elements, where it can be relied on
+    within: tuple[float, float] | None = None  # range of its elements
     literal: bool = False  # a number, or the name of one
+    of: "tuple[str, Value, Value] | None" = None  # operator and operands, whose lower bits alone make its lower bits
 
     @property
     def is_constant(self) -> bool:
         """True for an integer that can only be one number, and whose text does nothing else."""
         return self.kind == "int" and self.lo == self.hi and not self.acts
+
+    @property
+    def is_composite(self) -> bool:
+        """True for an operator between two operands: no cast may make it wider, or of another sign (MISRA C 10.8)."""
+        return self.level > UNARY
 
     @property
     def acts(self) -> bool:
@@ -145,7 +155,7 @@ def number(value: float) -> Value:
         if bits_of(value) == 128:
             raise RefusedError("FW02", None, f"the number {value}", "a number of 64 bits", "use a smaller one")
         if value == LOWEST:
-            return whole("INT64_MIN", "int64_t", value, value)
+            return whole("((-INT64_MAX) - 1)", "int64_t", value, value)
         wide = bits_of(value) > 32 or value == -(1 << 31)
         text = f"INT64_C({abs(value)})" if wide else str(abs(value))
         text = f"(-{text})" if value < 0 else text
@@ -163,17 +173,7 @@ def as_whole(value: Value) -> Value:
         return value
     if value.truth is not None:
         return number(int(value.truth))
-    return whole(f"({value.text} ? 1 : 0)", "int", 0, 1)
-
-
-def as_real(value: Value) -> Value:
-    """An integer as a float, as Python takes it beside one."""
-    if value.kind == "float":
-        return value
-    value = as_whole(value)
-    if value.is_constant and bits_of(value.lo) <= 32:
-        return number(float(value.lo))
-    return real(f"(double){in_brackets(value, UNARY)}", UNARY)
+    return whole(f"{in_brackets(value, UNARY)} ? (int)1 : 0", "int", 0, 1, ANY + 1)
 
 
 def as_truth(value: Value) -> Value:
@@ -183,36 +183,17 @@ def as_truth(value: Value) -> Value:
     if value.kind == "int":
         if value.is_constant or not (value.acts or value.lo <= 0 <= value.hi):
             return decided(value.lo != 0)
-        return truth(f"{in_brackets(value, UNARY)} != 0")
+        return truth(f"{in_brackets(value, UNARY)} != {'0U' if value.ctype in UNSIGNED else '0'}")
     if value.kind == "float":
         return truth(f"{in_brackets(value, UNARY)} != 0.0")
     raise outside_language(ast.Pass(), f"a condition of kind {value.kind}", "compare numbers")
 
 
-def cast(value: Value, ctype: str) -> Value:
-    """An integer in another type that holds it; C widens small ones by itself."""
-    if value.ctype == ctype or value.literal:
-        return value
-    if RANK[value.ctype] < RANK[ctype] and value.level == ATOM:
-        return value
-    return replace(value, text=f"({ctype}){in_brackets(value, UNARY)}", ctype=ctype, level=UNARY)
-
-
-def brought_to(bits: int, *values: Value) -> tuple[str, list[Value]]:
-    """Operands such that C computes in the type of so many bits; that type, and they."""
-    if bits == 16 and any(RANK[one.ctype] >= 32 and not one.literal for one in values):
-        bits = 32
-    ctype = TYPES[min(bits, 64)]
-    made = [
-        replace(one, text=f"({ctype}){in_brackets(one, UNARY)}", ctype=ctype, level=UNARY)
-        if RANK[one.ctype] > RANK[ctype] or one.ctype == "uint32_t"
-        else one
-        for one in values
-    ]
-    if bits > 16 and not any(one.ctype == ctype and not (one.literal and bits == 32) for one in made):
-        k = next((n for n, one in enumerate(made) if not one.literal), 0)
-        made[k] = replace(made[k], text=f"({ctype}){in_brackets(made[k], UNARY)}", ctype=ctype, level=UNARY)
-    return ctype, made
+def unsigned(value: Value) -> Value:
+    """A number that is not negative, as a constant without a sign; of a name `Program` says what is made of it."""
+    if value.text.startswith("INT64_C("):
+        return replace(value, text=f"U{value.text}", ctype="uint64_t")
+    return replace(value, text=f"{value.text}{'U' if value.text.isdigit() else UNSIGNED_NAME}", ctype="unsigned")
 
 
 def join(one: Value | None, other: Value) -> Value:

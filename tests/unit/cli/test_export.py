@@ -6,8 +6,9 @@ import pytest
 from tests.unit.test_cli import call
 
 import detent
-from detent.export import measure, teeth
+from detent.export import measure, misra, teeth
 from detent.export import verify as proving
+from detent.export.write import read_manifest
 from detent.methods.stepper_envelope.method import StepperEnvelopeMethod
 
 pytestmark = pytest.mark.compiled
@@ -62,7 +63,29 @@ def test_verify_tells_each_target_and_what_is_not_installed(monkeypatch):
     assert call("verify", "out", "--on", "gone").status == 1
     data = call("verify", "out", "--json").data
     nothing = {"equal": False, "proofs": [], "differences": [], "not run": {"gone": gone.missing}}
-    assert data == nothing | {"measured": {}, "reach": None, "mutants": []}
+    absent = {misra.TOOL: misra.missing()} if misra.missing() else {}
+    rules = data.pop("misra")
+    assert data == nothing | {"not run": nothing["not run"] | absent, "measured": {}, "reach": None, "mutants": []}
+    assert (rules == {}) if absent else (rules["2.5"] == 5 and rules.keys() <= misra.DEVIATIONS.keys())
+
+
+def test_verify_counts_rules_and_fails_where_one_is_not_to_be_broken(monkeypatch):
+    export()
+    broken = [misra.Finding("cascade_axis.c", 7, rule) for rule in ("15.5", "10.4", "15.5")]
+    monkeypatch.setattr(misra, "missing", str)
+    monkeypatch.setattr(misra, "findings", lambda *_: broken)
+    told = {"host-gcc": proving.TARGETS["host-gcc"]}
+    for module in (proving, measure):
+        monkeypatch.setattr(module, "TARGETS", told)
+    monkeypatch.setattr(proving, "_replayed", lambda *given: proving.Proof(given[2].name, given[3], True, "1"))
+    answer = call("verify", "out")
+    assert answer.status == 1
+    assert "cascade_axis.c:7 breaks rule 10.4 of MISRA C:2012" in answer.out
+    assert f"rule 15.5: 2 times; {misra.DEVIATIONS['15.5']}" in answer.out.replace("\n", " ")
+    assert read_manifest(Path("out"))["report"]["misra"] == {"10.4": 1, "15.5": 2}
+    del broken[1]
+    assert call("verify", "out").status == 0
+    assert read_manifest(Path("out"))["report"]["misra"] == {"15.5": 2}
 
 
 @pytest.mark.process

@@ -92,10 +92,10 @@ class Ranged(Registers):
 def test_a_range_is_checked_where_its_width_does_not_hold_it_anyway():
     found = range_checks(SimpleNamespace(options={(Ranged, "folded"): 1}, shape=Shape()), Ranged())
     assert [(one["number"], one["text"], one["length"]) for one in found] == [
-        (2, "(p->share >= 0.5) && (p->share <= 1.0)", 0), (3, "(p->low <= 9)", 0), (5, "(p->table[k] <= 5)", 3),
+        (2, "(p->share >= 0.5) && (p->share <= 1.0)", 0), (3, "(p->low <= 9U)", 0), (5, "(p->table[k] <= 5)", 3),
     ]  # fmt: skip
     text = template("unit.c.in", name="n", code="", floats=False, checks=[{"text": "a[k]", "number": 5, "length": 3}])
-    assert "for (uint32_t k = 0; k < 3; k++) {\n        if (!(a[k])) {\n            return 5;" in text
+    assert "for (uint32_t k = 0; k < 3U; k++) {\n        if (!(a[k])) {\n            return 5;" in text
 
 
 def parsed(data: bytes, leaves, signals=(8, 8, 8, 8), calls=()):

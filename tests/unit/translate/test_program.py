@@ -49,7 +49,7 @@ def test_a_refusal_names_file_and_line():
 
 def test_an_option_is_folded_and_what_only_the_other_way_reaches_is_gone():
     both = text_of(firmware_steps.folded)
-    assert "if (p->form != 0)" in both
+    assert "if (p->form != 0U)" in both
     one = text_of(firmware_steps.folded, options={(Limits, "form"): 1})
     assert "form" not in one
     assert "t_bump" not in one
@@ -85,6 +85,38 @@ def test_functions_stand_behind_those_they_call_with_their_docstrings():
     text = text_of(firmware_steps.effects)
     assert text.index("static int t_bump(") < text.index("void t_effects(")
     assert " * Writes, and gives something.\n" in text
+
+
+# ---- essential types of MISRA C
+
+
+def test_an_operand_without_a_sign_stands_beside_a_number_without_one():
+    text = text_of(firmware_steps.signs)
+    assert "#define T_LAST 255U\n" in text  # beside p->form alone
+    assert "#define T_STRIDE 1\n" in text  # a summand, too
+    assert "if ((p->form == T_LAST) || (p->form == (unsigned)T_STRIDE)) {" in text
+    assert "UNUSED" not in text  # a number of a branch that is left out
+
+
+def test_an_operators_result_is_made_wider_or_unsigned_by_a_function():
+    text = text_of(firmware_steps.signs)
+    assert "r->inner.word = (uint16_t)((unsigned)r->half & 7U);" in text
+    assert "r->count = t_i64_of_i32(r->half * (int32_t)p->form);" in text
+    assert "r->angle = t_f64_of_i32((int32_t)r->half + T_STRIDE);" in text
+    assert "r->other = (int64_t)t_shift_down_int((int)p->form, p->shift);" in text
+
+
+def test_a_chain_of_else_if_ends_with_an_else():
+    text = text_of(firmware_steps.signs)
+    assert text.count("    } else {\n        /* nothing */\n    }\n") == 1
+
+
+def test_what_a_call_gives_is_kept_before_registers_are_read_beside_it():
+    text = text_of(firmware_steps.effects)
+    assert (
+        "t2_ = t_wrap_add_i64(t1_, t_bump(r, a));\n    r->count = t_wrap_add_i64(t2_, t_wrap_mul_i64(r->other, 2))"
+        in text
+    )
 
 
 # ---- against C

@@ -168,7 +168,8 @@ def ink_columns(c: PrintHeadController, bank: u1, first: u2, end: u2, inked: u1)
     """Columns `first` to below `end` of a bank of the line buffer print, or with `inked` 0 do not."""
     base = COLUMNS if bank else 0
     for k in range(min(first, COLUMNS), min(end, COLUMNS)):
-        c.head.buffer.ink[base + k] = inked
+        if c.head.buffer.ink[base + k] != inked:  # a plain loop of stores becomes a call of memset in C
+            c.head.buffer.ink[base + k] = inked
 
 
 def load_line(c: PrintHeadController, bank: int, inked: Iterable[range], act: Act = do) -> None:

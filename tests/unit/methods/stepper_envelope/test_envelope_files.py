@@ -171,7 +171,7 @@ def test_every_name_begins_with_the_motors(tmp_path):
         *re.findall(r"static (?:inline|const) \w+ (\w+)", code),
         *re.findall(r"^} (\w+);", code, flags=re.MULTILINE),
     }
-    assert len(named) == 65
+    assert len(named) == 66
     assert all(name.startswith(("zoom_a_", "ZOOM_A_")) for name in named)
     assert re.search(r"\b(double|float|malloc)\b|\d\.\d", code) is None
 
