@@ -5,18 +5,19 @@ import hashlib
 import io
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from importlib import resources
-from typing import Any, get_args
+from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 
 from detent import __version__
 from detent.export.drawn import FAR, PLACES, SEED, Chance, Row, drawn_from
-from detent.export.unit import LARGE, ControlUnit, every, members
+from detent.export.selftest import CALLS, self_test
+from detent.export.unit import LARGE, WIDTHS, ControlUnit, arguments, every, members
 from detent.export.vectors import Golden
-from detent.kernel.registers import Field, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
+from detent.kernel.registers import Field, Leaf, Registers, Width
 from detent.translate.program import Function, Program
 from detent.translate.text import FLASH_INCLUDE, code_text, comment_of, signals_text, struct_texts
 from detent.translate.values import Value, c_field, interval_of, number, type_of_local, unsigned
@@ -54,8 +55,14 @@ def template(file: str, package: Any = "detent.export", **given: Any) -> str:
     )
     environment.filters["comment"] = comment_of
     environment.filters["quoted"] = _quoted
+    environment.filters["number"] = _number
     text = resources.files(package).joinpath(file).read_text(encoding="utf-8")
     return environment.from_string(text).render(**given)
+
+
+def _number(value: Any) -> str:
+    """A number of C."""
+    return number(value).text
 
 
 def _quoted(text: str) -> str:
@@ -100,12 +107,12 @@ class Parameter:
 
 def parameters(program: Program, params: Registers) -> Iterator[Parameter]:
     """Every parameter, in the order of declaration."""
-    for count, (prefix, registers, field, width) in enumerate(_fields(params, "")):
+    for count, (prefix, registers, field, width) in enumerate(_fields(program, params, "")):
         place = (type(registers), field.name)
         folded, word = place in program.options, "an option" if field.option else "by --fixed"
         is_table = place in program.shape.tables
         value = getattr(registers, field.name)
-        default = f"{len(value)} values" if field.length else repr(value)
+        default = f"{field.length} values" if field.length else repr(value)
         yield Parameter(
             count, prefix + field.name,
             "" if folded or is_table else place_of(f"p.{prefix}{field.name}", parameters="p->"),
@@ -120,10 +127,11 @@ def range_text(claimed: tuple[float, float] | None) -> str:
     return "" if claimed is None else f"{claimed[0]} to {claimed[1]}"
 
 
-def _fields(registers: Registers, prefix: str) -> Iterator[tuple[str, Registers, Field, Width]]:
-    for field, value in members(registers):
+def _fields(program: Program, registers: Registers, prefix: str) -> Iterator[tuple[str, Registers, Field, Width]]:
+    for declared, value in members(registers):
+        field = program.shape.seen(type(registers), declared)
         if field.block is not None:
-            yield from _fields(value, f"{prefix}{field.name}.")
+            yield from _fields(program, value, f"{prefix}{field.name}.")
         elif field.width is not None:
             yield prefix, registers, field, field.width
 
@@ -190,7 +198,7 @@ def _initialiser(program: Program, registers: Registers, depth: int = 1) -> str:
         if field.block is not None:
             text = _initialiser(program, value, depth + 1)
         elif field.length:
-            text = "{" + ", ".join(number(one).text for one in value) + "}"
+            text = "{" + ", ".join(number(one).text for one in value[: field.length]) + "}"
         else:
             text = number(value).text
         unit = f" /* {field.unit} */" if field.unit and field.block is None else ""
@@ -200,7 +208,7 @@ def _initialiser(program: Program, registers: Registers, depth: int = 1) -> str:
 
 def range_checks(program: Program, params: Registers) -> Iterator[dict[str, Any]]:
     """Conditions of the parameters with a range, for each element of an array; what a width cannot hold needs none."""
-    for row, (_, _, field, width) in zip(parameters(program, params), _fields(params, ""), strict=True):
+    for row, (_, _, field, width) in zip(parameters(program, params), _fields(program, params, ""), strict=True):
         if field.range is None or not row.expression:
             continue
         place, (lo, hi) = row.expression + ("[k]" if row.length else ""), field.range
@@ -227,18 +235,15 @@ def texts(  # noqa: PLR0913 - what the files tell of
     }
     code = code_text(program)
     floats = any(leaf.float for leaf in leaves)
-    if floats and "<string.h>" not in code:
-        code = "#include <string.h>\n" + code
     signals = [
         {"code": value.width.code, "ctype": value.width.c_name, "bytes": value.width.size, "most": golden.signals[k][0]}
         for k, value in enumerate(signals_of(unit, program))
         if value.width is not None
     ]
-    numbers = {width.code: width for width in (get_args(one)[1] for one in (u1, u2, u4, i1, i2, i4, i8, f8))}
     calls = [
         {"name": one, "takes": taken, "texts": list(_arguments(taken))}
         for one, codes in unit.calls.items()
-        for taken in [[numbers.get(code, code) for code in codes]]
+        for taken in [[WIDTHS.get(code, code) for code in codes]]
     ]
     given = {
         "name": name, "NAME": name.upper(), "begins": unit.begins, "version": __version__,
@@ -248,13 +253,15 @@ def texts(  # noqa: PLR0913 - what the files tell of
         "flash": FLASH_INCLUDE if f"#define {name.upper()}_FLASH" in signals_text(program) else "",
         "prototypes": "".join(_prototype(program, f) for f in program.steps.values() if f.entry),
         "code": code, "checks": list(range_checks(program, params)), "floats": floats, "images": list(images.items()),
+        "tested": CALLS,
     }  # fmt: skip
     made = {f"{name}.h": template("unit.h.in", **given), f"{name}.c": template("unit.c.in", **given)}
     if program.shape.tables:
-        values = {one: getattr(registers, field.name) for _, registers, field, _ in every(params)
+        values = {one: getattr(registers, field.name)[: one.length] for _, registers, field, _ in every(params)
                   for one in [program.shape.tables.get((type(registers), field.name))] if one}  # fmt: skip
         made[f"{name}_tables.c"] = template("tables.c.in", name=name, NAME=name.upper(), tables=list(values.items()))
     made[f"{name}_image.c"] = template("image.c.in", **given)
+    made[f"{name}_selftest.c"] = _selftest_text(unit, params, given)
     initialiser = _initialiser(program, params)
     text = template("params.c.in", name=name, initialiser=initialiser)
     made[f"{name}_params.c"] = f"#include <math.h>\n{text}" if "INFINITY" in initialiser else text
@@ -262,7 +269,7 @@ def texts(  # noqa: PLR0913 - what the files tell of
         "exchanged": [
             {"number": row.number, "length": row.length, "float": width.is_float, "ctype": width.c_name,
              "place": row.expression + ("[k]" if row.length else "")}
-            for row, (_, _, _, width) in zip(parameters(program, params), _fields(params, ""), strict=True)
+            for row, (_, _, _, width) in zip(parameters(program, params), _fields(program, params, ""), strict=True)
             if row.number in golden.changed
         ],
         "signals": signals, "leaves": leaves, "calls": calls,
@@ -274,10 +281,29 @@ def texts(  # noqa: PLR0913 - what the files tell of
     made["params.csv"] = table(parameters(program, params))
     made["registers.csv"] = table(registers(unit))
     made["trace.csv"] = table(traced(program, made[f"{name}.c"]))
-    sources = [f"{name}{part}.c" for part in ("", "_params", "_tables") if f"{name}{part}.c" in made]
+    parts = ("", "_params", "_tables", "_image", "_selftest")
+    sources = [f"{name}{part}.c" for part in parts if f"{name}{part}.c" in made]
     flags = f"{FLAGS} {PROCESSORS[target]}".strip()
     made["build.mk"] = f"{name}_CFLAGS := {flags}\n{name}_SOURCES := {' '.join(sources)}\n"
     return made
+
+
+def _selftest_text(unit: ControlUnit, params: Registers, given: Mapping[str, Any]) -> str:
+    """The calls of the self-test, with the hash that the compiled steps make of them."""
+    found = self_test(unit, params)
+    roots = {"params": f"&{unit.name}_defaults", "controller": "&c", "lines": "&l"}
+    calls = list[dict[str, Any]]()
+    for one in found.calls:
+        step = unit.entries[one.name]
+        numbers, signals = iter(one.numbers), (f"s{k}" for k in range(len(found.laid)))
+        codes = arguments(step, {unit.params: "params", unit.controller: "controller", unit.lines: "lines"})
+        texts = [roots.get(code) or (next(signals) if code == "signal" else number(next(numbers)).text)
+                 for code in codes]  # fmt: skip
+        shown = [(place_of(leaf.path, "c.", "l."), number(value).text) for leaf, value in one.shown]
+        calls.append({"name": one.name, "texts": texts, "shown": shown})
+    sizes = {root: sum(leaf.width.size * max(leaf.length, 1) for leaf in unit.leaves if leaf.path[0] == root)
+             for root in "cl"}  # fmt: skip
+    return template("selftest.c.in", **given, laid=found.laid, calls=calls, hash=f"{found.hash:016X}", sizes=sizes)
 
 
 def _arguments(taken: Iterable[str | Width]) -> Iterator[str]:

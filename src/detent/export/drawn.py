@@ -34,9 +34,9 @@ from detent.kernel.compiled import bits_of
 from detent.kernel.draws import Draws, Ends, Places, add_image, draw, draw_into, draw_real, draw_whole, misuse
 from detent.kernel.image import WHOLE, add_bytes, begin_hash
 from detent.kernel.loop import HostArray
-from detent.kernel.registers import PLANT, Leaf, Registers, Width
+from detent.kernel.registers import PLANT, Registers, Width
 from detent.translate.program import Function, Program
-from detent.translate.values import Value, interval_of
+from detent.translate.values import Shape, Value, interval_of
 
 MAGIC, VERSION = b"DTNR", 1
 END, FUNCTION, MISUSE, STRETCH = range(4)
@@ -72,14 +72,15 @@ class Row:
 
 
 def rows_of(  # noqa: PLR0913 - it calls itself for blocks
-    registers: Registers, root: str, options: Any, prefix: str = "", offset: int = 0, by: str = ""
+    registers: Registers, root: str, options: Any, shape: Shape, prefix: str = "", offset: int = 0, by: str = ""
 ) -> Iterator[tuple[Row, str]]:
     """Every register that is in the structure in C, with who writes it."""
-    for field in type(registers).__fields__.values():
+    for declared in type(registers).__fields__.values():
+        field = shape.seen(type(registers), declared)
         path, place, writer = prefix + field.name, offset + field.offset, field.by or by
         value = getattr(registers, field.name)
         if field.block is not None:
-            yield from rows_of(value, root, options, f"{path}.", place, writer)
+            yield from rows_of(value, root, options, shape, f"{path}.", place, writer)
         elif field.width is not None and (type(registers), field.name) not in options:
             lo, hi = (0, 0) if field.width.is_float else drawn_from(*interval_of(field.width))
             low, high = field.range or (-FAR, FAR)
@@ -123,7 +124,7 @@ class Chance:
         self.unit, self.program, self.given = unit, program, params
         self.files: dict[str, Any] = {"p": params.copy(), "c": unit.controller(), "l": unit.lines()}
         elsewhere = program.options.keys() | program.shape.tables.keys()
-        drawn = {root: list(rows_of(one, root, elsewhere)) for root, one in self.files.items()}
+        drawn = {root: list(rows_of(one, root, elsewhere, unit.shape)) for root, one in self.files.items()}
         self.rows = {root: [row for row, _ in found] for root, found in drawn.items()}
         self.wires = [row for row, by in drawn["l"] if by == PLANT and row.length <= LARGE]
         self._arrays = {root: arrays(rows) for root, rows in self.rows.items()}
@@ -145,8 +146,7 @@ class Chance:
         self.told: list[Any] = []  # arguments of the last call
 
     def _bytes_of(self, root: str, large: bool) -> Any:  # noqa: FBT001 - as of `Golden`
-        leaves: list[Leaf] = list(self.files[root].leaves())
-        found = [leaf for leaf in leaves if (leaf.length > LARGE) == large]
+        found = [leaf for leaf in self.unit.leaves if leaf.path[0] == root and (leaf.length > LARGE) == large]
         ranges = [np.arange(leaf.offset, leaf.offset + leaf.width.size * max(leaf.length, 1)) for leaf in found]
         return np.concatenate(ranges).astype(np.int64) if ranges else np.zeros(0, np.int64)
 

@@ -113,7 +113,7 @@ def _measured(folder: Path, manifest: Mapping[str, Any], target: Target, clock: 
             unit = f"{target.compiler} {FLAGS} {level} {target.flags} -I{source} -c {source}/{name}.c -o unit.o"
             told = told or run_tool(unit.split(), work)
             told = told or compile_parts(source, name, target, level, work, "-include count.h")
-            told = told or link(work, target, level, "job", ("unit", "replay", "board_job"))
+            told = told or link(work, target, level, "job", ("unit", "replay", "selftest", "board_job"))
             if told:
                 return Measured(target.name, missed=f"does not compile: {told}")
             sizes[level] = sizes_of(tools, work, entries, "job", tables)

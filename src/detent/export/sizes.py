@@ -14,8 +14,15 @@ LOWERED = (
     (("str.w", "str", "strd"), re.compile(r"\[sp, #-(\d+)\]!")),
     (("addi", "add"), re.compile(r"^sp,sp,-(\d+)")),  # RISC-V
 )
+LITERAL = re.compile(r"^\s*([0-9a-f]+):\t[0-9a-f ]+\t\.word\s+0x([0-9a-f]+)", re.MULTILINE)
+LOADED = (
+    ("ldr", re.compile(r"^(\w+), \[pc, #\d+\]\s*[;@] \(([0-9a-f]+)")),  # from among the literals
+    ("lui", re.compile(r"^(\w+),0x([0-9a-f]+)")),  # RISC-V: the upper 20 bits
+)
+BY_REGISTER = re.compile(r"^sp,(?: ?sp,)? ?([a-z]\w+)$")
+OF_AVR = re.compile(r"^r(28|29), 0x([0-9A-Fa-f]+)")
 FILLING = ("nop", "unimp")
-LEAVES = ("b", "b.n", "b.w", "bx", "j", "jr", "ret", "mret", "udf", "tail")
+LEAVES = ("b", "b.n", "b.w", "bx", "j", "jr", "jmp", "rjmp", "ret", "reti", "mret", "udf", "tail")
 
 
 @dataclass(frozen=True)
@@ -49,14 +56,60 @@ class Routine:
     calls: set[str] = field(default_factory=set[str])
 
 
-def routines(listing: str) -> dict[str, Routine]:
+class _Frame:
+    """What the instructions of one routine take of the stack, in their order; `back` is what a call leaves there."""
+
+    def __init__(self, literals: Mapping[int, int], back: int) -> None:
+        self._literals, self._back = literals, back
+        self._held: dict[str, int] = {}  # numbers that registers hold
+        self._lower = 0  # low byte of what an AVR is about to take off its frame pointer
+
+    def taken(self, word: str, rest: str) -> int:
+        """Bytes by which an instruction lowers the stack pointer."""
+        if self._back:
+            return self._taken_by_avr(word, rest)
+        by = BY_REGISTER.match(rest) if word == "add" else None
+        if by and by[1] in self._held:
+            number = self._held[by[1]]
+            return (1 << 32) - number if number >> 31 else 0
+        self._held.pop(rest.partition(",")[0], None)
+        for loads, pattern in LOADED:
+            told = pattern.match(rest) if word == loads else None
+            if told:
+                number = int(told[2], 16)
+                self._held[told[1]] = self._literals.get(number, 0) if word == "ldr" else number << 12
+        return _taken(word, rest)
+
+    def _taken_by_avr(self, word: str, rest: str) -> int:
+        """Of an AVR, whose frame pointer is r28 and r29: what is pushed, and what a copy of the pointer loses."""
+        if word == "push":
+            return 1
+        if word == "rcall" and rest.startswith(".+0"):
+            return self._back
+        told = OF_AVR.match(rest)
+        if word == "in" and told:
+            self._held["r28"] = 1
+        elif told and "r28" in self._held and word == "sbiw":
+            return int(told[2], 16)
+        elif told and "r28" in self._held and word in ("subi", "sbci"):
+            number = int(told[2], 16)
+            if told[1] == "28":
+                self._lower = number
+            else:
+                return number << 8 | self._lower if number < 128 else 0
+        return 0
+
+
+def routines(listing: str, back: int = 0) -> dict[str, Routine]:
     """Every routine of a program, from its machine code as ``objdump -d`` lists it.
 
     What a routine takes of the stack is the sum of all that it pushes or makes room for, wherever it does so: at least
-    what any way through it takes. One that does not leave at its end goes on in the next.
+    what any way through it takes. One that does not leave at its end goes on in the next. Where a call itself leaves
+    something on the stack, `back` is how much [byte]; so far that is an AVR.
     """
     found: dict[str, Routine] = {}
-    name, last = "", ""
+    literals = {int(at, 16): int(value, 16) for at, value in LITERAL.findall(listing)}
+    name, last, frame = "", "", _Frame(literals, back)
     for line in listing.splitlines():
         head = HEAD.match(line)
         if head:
@@ -65,8 +118,8 @@ def routines(listing: str) -> dict[str, Routine]:
                 found[name].end = begin
                 if not _leaves(last):
                     found[name].calls.add(head[2])
-            name, last = head[2], ""
-            found[name] = Routine(begin)
+            name, last, frame = head[2], "", _Frame(literals, back)
+            found[name] = Routine(begin, frame=back)
             continue
         told = LINE.match(line)
         if not told or not name:
@@ -76,9 +129,9 @@ def routines(listing: str) -> dict[str, Routine]:
         if word[0] == "." or word in FILLING:
             continue
         last = f"{word} {rest}"
-        one.frame += _taken(word, rest)
+        one.frame += frame.taken(word, rest)
         target = re.search(r"<([^>+]+)", rest)
-        if target and word[0] in "bjct" and target[1] != name:
+        if target and word[0] in "bjctr" and target[1] != name:
             one.calls.add(target[1])
     return found
 
@@ -125,7 +178,9 @@ def reached(names: Iterable[str], known: Mapping[str, Routine]) -> dict[str, int
     return dict(sorted(found.items()))
 
 
-def sizes_of(tools: str, work: Path, entries: Iterable[str], program: str = "", tables: int = 0) -> Sizes:
+def sizes_of(  # noqa: PLR0913 - by which tools, of what
+    tools: str, work: Path, entries: Iterable[str], program: str = "", tables: int = 0, back: int = 0
+) -> Sizes:
     """Of the objects in a folder and of the program with them, by the binutils whose names begin with `tools`."""
     sections = {
         words[0]: int(words[1])
@@ -140,7 +195,7 @@ def sizes_of(tools: str, work: Path, entries: Iterable[str], program: str = "", 
     told = _told([f"{tools}readelf", "-sW", program], work) if program else ""
     data = {words[7] for words in (line.split() for line in told.splitlines()) if words[3:4] == ["OBJECT"]}
     listing = _told([f"{tools}objdump", "-d", program], work) if program else ""
-    known = {name: one for name, one in routines(listing).items() if name not in data}
+    known = {name: one for name, one in routines(listing, back).items() if name not in data}
     defaults = next((size for name, size in symbols.items() if name.endswith("_defaults")), 0)
 
     def whole(*kinds: str) -> int:

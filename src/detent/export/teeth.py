@@ -76,7 +76,7 @@ def _programs(folder: Path, name: str) -> dict[str, str]:
     """Sources of the two programs by the vectors that they replay."""
     tables = f"{name}_tables.c" if (folder / f"{name}_tables.c").is_file() else ""
     rest = f"{name}_params.c {tables} {name}_image.c board.c"
-    return {"drawn": f"{name}_drawn.c {rest}", "job": f"{name}.c {name}_replay.c {rest}"}
+    return {"drawn": f"{name}_drawn.c {rest}", "job": f"{name}.c {name}_replay.c {name}_selftest.c {rest}"}
 
 
 def _copy(folder: Path, made: str) -> Path:

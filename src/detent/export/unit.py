@@ -7,20 +7,23 @@ import inspect
 import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 from detent.axis import Axis
 from detent.errors import DetentError
 from detent.kernel.loop import control_of
-from detent.kernel.registers import Field, Leaf, Registers, Width
+from detent.kernel.registers import Field, Fit, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
 from detent.methods.registry import METHODS
-from detent.translate.program import Program
+from detent.translate.program import Program, blocks_of
 from detent.translate.values import C_WORDS, RefusedError, Shape, Table
 
 NARROW = ("avr",)  # targets whose double is not IEEE binary64
+WIDTHS: dict[str, Width] = {one.code: one for one in (get_args(hint)[1] for hint in (u1, u2, u4, i1, i2, i4, i8, f8))}
+"""What an argument of a call can be."""
+AS_DECLARED = Fit()
 LARGE = 64  # elements of an array that enters the hash of every 1000th tick only if it has more
 
 
@@ -34,6 +37,47 @@ class ControlUnit:
     lines: type[Registers]
     entries: Mapping[str, Callable[..., Any]]  # by their names in C: the tick first, then what the host does
     motor: str = ""  # which of several motors of the axis it moves
+    fits: Callable[[Any], Fit] | None = None  # how much of its arrays some parameters use
+    fit: Fit = AS_DECLARED  # how much of them it has
+
+    @cached_property
+    def shape(self) -> Shape:
+        """What of its registers is other in C than it is declared."""
+        narrowed = {(one, name): (one.__fields__[name].width, ends) for (one, name), ends in self.fit.ranges.items()}
+        return Shape(lengths=self.fit.lengths, narrowed=cast("Any", narrowed))
+
+    def fitted(self, params: Registers, later: Sequence[Registers] = ()) -> "ControlUnit":
+        """The same with arrays as long as these parameters use them; the parameters say so from then on.
+
+        Where other sets come `later`, as long as any of them does.
+        """
+        if self.fits is None:
+            return self
+        fit = max(map(self.fits, (params, *later)), key=lambda one: sum(one.lengths.values()))
+        for _, registers, declared, _ in every(params):
+            if (type(registers), declared.name) in fit.values:
+                setattr(registers, declared.name, fit.values[type(registers), declared.name])
+        return replace(self, fit=fit)
+
+    @property
+    def told_fit(self) -> dict[str, dict[str, Any]]:
+        """Its fit as plain data, by the names of class and register."""
+        return {
+            key: {f"{one.__name__}.{name}": value for (one, name), value in getattr(self.fit, key).items()}
+            for key in ("lengths", "ranges")
+        }
+
+    def fitted_as(self, told: Mapping[str, Mapping[str, Any]]) -> "ControlUnit":
+        """The unit whose `told_fit` this is."""
+        classes = {one.__name__: one for root in (self.params, self.controller, self.lines) for one in blocks_of(root)}
+
+        def found(values: Mapping[str, Any]) -> dict[tuple[type[Registers], str], Any]:
+            """By the classes themselves; what is gone by now is left out."""
+            places = {place: place.rpartition(".") for place in values}
+            return {(classes[one], name): values[place] for place, (one, _, name) in places.items() if one in classes}
+
+        ranges = {place: tuple(ends) for place, ends in found(told["ranges"]).items()}
+        return replace(self, fit=Fit(found(told["lengths"]), cast("Any", ranges)))
 
     @cached_property
     def calls(self) -> dict[str, tuple[str, ...]]:
@@ -49,7 +93,12 @@ class ControlUnit:
     @cached_property
     def leaves(self) -> tuple[Leaf, ...]:
         """Every register of the state, controller before lines, in the order of declaration; by number in a vector."""
-        return (*self.controller.leaves("c."), *self.lines.leaves("l."))
+        return tuple(
+            replace(leaf, length=seen.length, range=seen.range)
+            for registers, root in ((self.controller, "c."), (self.lines, "l."))
+            for leaf, (of, declared) in zip(registers.leaves(root), places_of(registers), strict=True)
+            for seen in [self.shape.seen(of, declared)]
+        )
 
     @cached_property
     def layout_hash(self) -> int:
@@ -61,8 +110,17 @@ class ControlUnit:
     def translated(self, params: Registers, tunable: Sequence[str] = (), fixed: Sequence[str] = ()) -> Program:
         """The unit in C, with the options of these parameters folded in but for `tunable`, and `fixed` too."""
         roots = {self.params: "params", self.controller: "controller", self.lines: "lines"}
-        shape = Shape(tables=tables_of(params, self.name))
+        shape = replace(self.shape, tables=tables_of(params, self.name, self.shape))
         return Program(self.name, self.entries, self.params, folded(params, tunable, fixed), roots, shape)
+
+
+def places_of(registers: type[Registers]) -> Iterator[tuple[type[Registers], Field]]:
+    """Class and declaration of every stored quantity, in the order of `Registers.leaves`."""
+    for declared in registers.__fields__.values():
+        if declared.block is not None:
+            yield from places_of(declared.block)
+        else:
+            yield registers, declared
 
 
 def arguments(step: Callable[..., Any], roots: Mapping[type[Registers], str]) -> Iterator[str]:
@@ -132,14 +190,16 @@ def _one_value(pattern: str, rows: Sequence[tuple[str, Any, int]]) -> float:
     return rows[0][1]
 
 
-def tables_of(params: Registers, name: str) -> dict[tuple[type[Registers], str], Table]:
+def tables_of(params: Registers, name: str, shape: Shape) -> dict[tuple[type[Registers], str], Table]:
     """Arrays of the parameters that are tables, where their class occurs once: constants of a unit of this name."""
     found: dict[tuple[type[Registers], str], list[Table]] = {}
-    for path, registers, field, value in every(params):
-        if field.table and field.width is not None:
-            read = f"{name}_{field.width.code}".upper() + f"({name.upper()}_TABLE({{text}}), {{index}})"
-            made = Table(f"{name}_{path.replace('.', '_')}", field.width, field.length, (min(value), max(value)), read)
-            found.setdefault((type(registers), field.name), []).append(made)
+    for path, registers, declared, value in every(params):
+        seen = shape.seen(type(registers), declared)
+        if seen.table and seen.width is not None:
+            read = f"{name}_{seen.width.code}".upper() + f"({name.upper()}_TABLE({{text}}), {{index}})"
+            used = value[: seen.length]
+            made = Table(f"{name}_{path.replace('.', '_')}", seen.width, seen.length, (min(used), max(used)), read)
+            found.setdefault((type(registers), seen.name), []).append(made)
     return {place: tables[0] for place, tables in found.items() if len(tables) == 1}
 
 
@@ -169,19 +229,20 @@ def refuse_floats(unit: ControlUnit, target: str) -> None:
                 raise RefusedError("FW05", None, got, expected, "a variant in whole numbers, or another --target")
 
 
-def outside_ranges(params: Registers) -> Iterator[tuple[str, float, tuple[float, float]]]:
+def outside_ranges(params: Registers, shape: Shape | None = None) -> Iterator[tuple[str, float, tuple[float, float]]]:
     """Parameters outside the ranges of their registers: path, value, range."""
-    for path, value, claimed in ranged(params):
+    for path, value, claimed in ranged(params, shape or Shape()):
         if not claimed[0] <= value <= claimed[1]:
             yield path, value, claimed
 
 
-def ranged(registers: Registers) -> Iterator[tuple[str, float, tuple[float, float]]]:
+def ranged(params: Registers, shape: Shape) -> Iterator[tuple[str, float, tuple[float, float]]]:
     """Every value of which a range is declared: path, value, range."""
-    for path, _, field, value in every(registers):
-        if field.range is not None:
-            for k, one in enumerate(value if field.length else [value]):
-                yield path + (f"[{k}]" if field.length else ""), one, field.range
+    for path, registers, declared, value in every(params):
+        seen = shape.seen(type(registers), declared)
+        if seen.range is not None:
+            for k, one in enumerate(value[: seen.length] if seen.length else [value]):
+                yield path + (f"[{k}]" if seen.length else ""), one, seen.range
 
 
 def unit_of(axis: Axis, prefix: str = "", motor: str = "") -> ControlUnit:
@@ -216,4 +277,6 @@ def _unit(method: Any, name: str, motor: str = "") -> ControlUnit:
         raise DetentError(f"the method {method.name} has no controller of its own; name another axis")
     steps = {f"{name}_control": control_of(params)}
     steps |= {f"{name}_{one}": method.brought(f"controller:{one}") for one in (*method.actions, *method.interrupts)}
-    return ControlUnit(name, params, controller, lines, steps, motor)
+    return ControlUnit(
+        name, params, controller, lines, steps, motor, method.brought(method.fits) if method.fits else None
+    )

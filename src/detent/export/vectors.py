@@ -19,7 +19,7 @@ are part of it, but enter the hash of a check only.
 
 import ctypes
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import pairwise
 from typing import Any
@@ -28,10 +28,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
-from detent.export.unit import LARGE, ControlUnit, signal_widths
+from detent.export.unit import LARGE, ControlUnit, outside_ranges, signal_widths
 from detent.kernel.image import add_bytes, add_rows, begin_hash
 from detent.kernel.loop import Bytes
 from detent.kernel.registers import PLANT, Leaf, Registers
+from detent.methods.changes import ParameterChange, changes_of
 from detent.translate.values import RefusedError
 
 MAGIC, VERSION = b"DTNV", 2
@@ -50,14 +51,35 @@ class EnoughError(Exception):
 class Golden:
     """A witness of a run: makes the vectors of its control unit."""
 
-    def __init__(self, unit: ControlUnit, state: type[Registers], most: int) -> None:
+    def __init__(
+        self, unit: ControlUnit, state: type[Registers], most: int, changes: Sequence[ParameterChange] = ()
+    ) -> None:
+        self._changes = changes  # of parameters, that the job will make
         self.unit, self.motor, self.most, self.ticks = unit, unit.motor, most, 0
         self.params: Any = None  # at power-on
         self.changed: set[int] = set()  # numbers of the parameters that are exchanged later
         self.hash = begin_hash()
         self.signals: list[tuple[int, int]] = []  # of each signal: its largest length, and bytes of an element
-        self.parts = [MAGIC + struct.pack("<BI", VERSION, unit.layout_hash)]
+        self.parts = list[bytes]()
         self._places = {name[0]: state.__fields__[name].offset for name in ("controller", "lines")}
+        self._leaves: tuple[Leaf, ...] = ()
+        self._known = bytes(ctypes.sizeof(unit.controller) + ctypes.sizeof(unit.lines))
+        self._set = b""  # the parameters as they are
+        self._feed: tuple[bytes, ...] = ()
+        self._actions = list(unit.entries.items())[1:]
+        self._state: Any = None
+
+    def _meet(self, params: Any) -> None:
+        """The axis is there: its arrays are as long as its parameters use them."""
+        if self._leaves:
+            return
+        later = [params.controller.copy()]
+        for one in self._changes:
+            later.append(later[-1].copy())
+            with suppress(AttributeError, TypeError):  # a name that is none is refused where the job is begun
+                one.store(later[-1])
+        self.unit = unit = self.unit.fitted(params.controller, later)
+        self.parts.append(MAGIC + struct.pack("<BI", VERSION, unit.layout_hash))
         self._leaves, sizes = unit.leaves, ctypes.sizeof(unit.controller)
         # Places in the memory of controller and lines, one behind the other.
         self._offsets = [leaf.offset + (sizes if leaf.path.startswith("l.") else 0) for leaf in self._leaves]
@@ -71,11 +93,6 @@ class Golden:
         where = np.cumsum([0, *(_size(self._leaves[k]) for k in small)])
         self._columns = {k: slice(int(where[n]), int(where[n + 1])) for n, k in enumerate(small)}
         self.rows: Bytes = np.zeros((STRETCH, len(self.picks)), np.uint8)
-        self._known = bytes(sizes + ctypes.sizeof(unit.lines))
-        self._set = b""  # the parameters as they are
-        self._feed: tuple[bytes, ...] = ()
-        self._actions = list(unit.entries.items())[1:]
-        self._state: Any = None
 
     def _bytes_of(self, k: int) -> NDArray[np.int64]:
         """Places of a register in the state of the axis."""
@@ -91,6 +108,7 @@ class Golden:
 
     def begin(self, params: Any, state: Any, feed: tuple[Any, ...]) -> None:
         """Note what the host has written since the last stretch."""
+        self._meet(params)
         if self.params is None:
             self.params, self._set = params.controller.copy(), bytes(params.controller)
         elif self._set != bytes(params.controller):
@@ -107,7 +125,11 @@ class Golden:
         self._look(state)
 
     def exchange(self, params: Any) -> None:
-        """Note another set of parameters."""
+        """Note another set of parameters; refused where it does not fit into the arrays."""
+        self._meet(params)
+        for path, value, (lo, hi) in outside_ranges(params.controller, self.unit.shape):
+            got, remedy = f"a job that sets {path} = {value}", "a value of an axis file decides how long its arrays are"
+            raise RefusedError("FW12", None, got, f"{lo} to {hi}, for which this unit has room", remedy)
         new, found = bytes(params.controller), list[bytes]()
         for number, leaf in enumerate(params.controller.leaves()):
             width = leaf.width.size
@@ -122,7 +144,7 @@ class Golden:
 
     def act(self, params: Any, state: Any, action: Callable[..., Any], args: tuple[Any, ...]) -> Any:
         """Let the host act, and note the call."""
-        del params  # an action that reads them is handed them
+        self._meet(params)  # an action that reads them is handed them
         self._look(state)
         number, name = next((k, name) for k, (name, one) in enumerate(self._actions) if one is action)
         numbers = [one for one in args if not isinstance(one, Registers)]
@@ -255,7 +277,7 @@ def _size(leaf: Leaf) -> int:
 
 def record(unit: ControlUnit, axis: Any, job: Any, most: int) -> Golden:
     """Do a job, and make its vectors, of `most` ticks at most."""
-    golden = Golden(unit, axis.method.registers(), most)
+    golden = Golden(unit, axis.method.registers(), most, changes_of(job, unit.motor))
     with suppress(EnoughError):
         axis.simulated.run(job, recorder=golden)
     return golden

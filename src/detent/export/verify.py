@@ -18,9 +18,10 @@ from detent.axis import Axis
 from detent.errors import DetentError
 from detent.export.code import FLAGS, PROCESSORS, WARNINGS, short_hash, template
 from detent.export.drawn import Chance, Row
-from detent.export.unit import refuse_floats, unit_named
+from detent.export.unit import ControlUnit, refuse_floats, unit_named
 from detent.export.vectors import cut
 from detent.export.write import changed_files, export_firmware, manifest_of
+from detent.kernel.registers import Registers
 from detent.translate.values import RefusedError
 
 TIMEOUT = 600.0  # of one replay [s]
@@ -177,17 +178,16 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
     name, source, job_file = manifest["name"], folder.resolve(), folder.resolve() / "vectors/job.vec"
     ticks, wanted = manifest["ticks"], manifest["hash"]
     with tempfile.TemporaryDirectory() as made:
-        work = Path(made)
-        unit = unit_named(manifest["method"], name)
-        if target.most and unit is not None:
-            data, ticks, wanted = cut(unit, job_file.read_bytes(), target.most)
+        work, known = Path(made), exported_unit(folder, manifest) if target.most else None
+        if known is not None:
+            data, ticks, wanted = cut(known[0], job_file.read_bytes(), target.most)
             job_file = work / "job.vec"
             job_file.write_bytes(data)
         strict = f"{target.compiler} {FLAGS} {level} {target.flags} {target.warnings} -Werror -I{source} -c"
         told = run_tool([*strict.split(), str(source / f"{name}.c"), "-o", "unit.o"], work)
         told = told or compile_parts(source, name, target, level, work, job=job_file)
         # The program of the random vectors holds the unit's own text, and sees its inner functions.
-        programs = {"job": ("unit", "replay")} | ({"drawn": ("drawn",)} if target.share else {})
+        programs = {"job": ("unit", "replay", "selftest")} | ({"drawn": ("drawn",)} if target.share else {})
         for program, parts in programs.items():
             told = told or link(work, target, level, program, (*parts, f"board_{program}"))
         if told:
@@ -205,7 +205,7 @@ def compile_parts(  # noqa: PLR0913 - what, for which processor, and where
     """Compile all around the unit; what the compiler says where it refuses, else nothing."""
     command = f"{target.compiler} {FLAGS} {level} {target.flags} -DSHARE={target.share} -I{source} {more} -c".split()
     programs = {"job": job or source / "vectors/job.vec", "drawn": source / "vectors/drawn.vec"}
-    parts = ["params", "tables", "image", "replay", "drawn"]
+    parts = ["params", "tables", "image", "selftest", "replay", "drawn"]
     if not target.share:
         del programs["drawn"]
         parts.remove("drawn")
@@ -272,13 +272,21 @@ def told_of(folder: Path, lines: Sequence[str]) -> str:
     return f"differs in tick {tick}: {'; '.join(found) or 'the hash alone'}"
 
 
-def chance_of(folder: Path, manifest: Mapping[str, Any]) -> Chance | None:
-    """What the random vectors of an export were drawn from; None where the steps are others by now."""
+def exported_unit(folder: Path, manifest: Mapping[str, Any]) -> tuple[ControlUnit, Registers] | None:
+    """The unit of an export, and its parameters at power-on; None where its registers are others by now."""
     unit = unit_named(manifest["method"], manifest["name"])
     data = (folder / "vectors/params.bin").read_bytes()
     if unit is None or len(data) != ctypes.sizeof(unit.params):
         return None
-    params = unit.params.from_buffer_copy(data)
+    return unit.fitted_as(manifest["fit"]), unit.params.from_buffer_copy(data)
+
+
+def chance_of(folder: Path, manifest: Mapping[str, Any]) -> Chance | None:
+    """What the random vectors of an export were drawn from; None where the steps are others by now."""
+    known = exported_unit(folder, manifest)
+    if known is None:
+        return None
+    unit, params = known
     program = unit.translated(params, **manifest["folding"])
     steps = {f"{one.place.rpartition(':')[0]} {one.py.__qualname__}": one.source for one in program.order}
     hashes = {name: short_hash(source.encode()) for name, source in steps.items()}

@@ -115,7 +115,8 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
     golden = record(unit, axis, loaded, ticks)
     if golden.params is None or golden.ticks == 0:
         raise DetentError(f"{loaded.name}: got a job of no ticks; expected: one with motion; try: another --job")
-    for path, value, (lo, hi) in outside_ranges(golden.params):
+    unit = golden.unit  # as long as the axis uses it
+    for path, value, (lo, hi) in outside_ranges(golden.params, unit.shape):
         got = f"{path} = {value}"
         raise RefusedError("FW12", None, got, f"{lo} to {hi}", "change the axis file until the value fits")
     program = unit.translated(golden.params, tunable, fixed)
@@ -158,6 +159,7 @@ def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[st
         "fixed": {key: value for key, value in told.items() if key not in options},
         "calls": [[name, [one for one in takes if one in FORMATS]] for name, takes in golden.unit.calls.items()],
         "signals": [one.width.code for one in signals_of(golden.unit, program) if one.width],
+        "fit": golden.unit.told_fit,
         "image": sum(leaf.width.size * max(leaf.length, 1) for leaf in golden.unit.leaves),
         "functions": len(program.order), "tick": axis.simulated.tick,
         "misra deviations": DEVIATIONS,
@@ -247,7 +249,8 @@ def readme(manifest: Mapping[str, Any], unit: ControlUnit, tick: str) -> str:
 Written by detent {manifest["detent"]} from an axis of the method {manifest["method"]}. C99, no heap, no globals.
 
 1. Compile the sources of `build.mk` with its flags, `{manifest["flags"]}` among them. Never `-ffast-math`.
-2. At power-on: check `{name}_selftest() == 0` and `{name}_check_params(&{name}_defaults) == 0`, set a
+2. At power-on: check `{name}_selftest() == 0`, which makes 64 calls with the flags of this very build, and
+   `{name}_check_params(&{name}_defaults) == 0`, set a
    `{name}_controller` and a `{name}_lines` to zero bytes, write what the sensors show into the lines, and call
    `{unit.begins}`.
 3. Every {tick}: write the lines that the plant writes, call `{name}_control`, and put the others out. Calls with the
@@ -256,12 +259,12 @@ Written by detent {manifest["detent"]} from an axis of the method {manifest["met
    `{name}.h` say what for.
 5. `registers.csv` names every register and `params.csv` every parameter. A `{name}_params` in RAM may be exchanged
    between two ticks, by its pointer.
-5. `{name}.a2l` says the same to calibration tools. It takes `{name}_p`, `{name}_c` and `{name}_l` for the variables of
+6. `{name}.a2l` says the same to calibration tools. It takes `{name}_p`, `{name}_c` and `{name}_l` for the variables of
    parameters, controller and lines; `detent export addresses` on this folder fills in where a linked program has them.
 
 The simulation handles what happened in a tick at its end: equal bits need the same calls in the same order.
 
 `detent verify` on this folder replays `vectors/job.vec`: {manifest["ticks"]} ticks of {manifest["job"]}, and compares
-the hash of all registers after every one. On a board, compile `{name}_image.c` and `{name}_replay.c` too, give them
-`{name}_get` and `{name}_put`, and call `{name}_replay()`: 0 is equal.
+the hash of all registers after every one. On a board, compile `{name}_replay.c` too, give it `{name}_get` and
+`{name}_put`, and call `{name}_replay()`: 0 is equal.
 """

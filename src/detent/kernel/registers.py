@@ -9,8 +9,9 @@ one declaration, and numpy takes the class for a dtype.
 import ctypes
 import inspect
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Self, get_args
 
 if TYPE_CHECKING:
@@ -88,6 +89,16 @@ class Leaf:
     length: int
     by: str = ""
     range: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How much of their arrays some registers use, and what those that reach into them hold then; by class and name."""
+
+    lengths: "Mapping[tuple[type[Registers], str], int]" = MappingProxyType({})
+    ranges: "Mapping[tuple[type[Registers], str], tuple[float, float]]" = MappingProxyType({})
+    values: "Mapping[tuple[type[Registers], str], int]" = MappingProxyType({})
+    """Parameters that say how much it is."""
 
 
 # Who writes a wire: sensor words and switches come from the plant, actuator words and enables from the controller.

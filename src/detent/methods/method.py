@@ -278,6 +278,9 @@ class Method(Protocol[SpecT]):
     """Steps of its `controller` that firmware has beside a tick of it, the first puts it on; none where it has none."""
     interrupts: ClassVar[tuple[str, ...]] = ()
     """Steps of its `controller` that a tick of it calls, and that an interrupt of firmware may call in its place."""
+    fits: ClassVar[str] = ""
+    """Place of how much of its arrays such a controller uses: ``fit(params)`` gives a `registers.Fit`; without one it
+    uses all of them."""
     boards: ClassVar[str] = ""
     """Place of how that firmware is led over a serial line, a `Board`; none where it is not."""
     linear_loops: ClassVar[str] = ""

@@ -27,6 +27,10 @@ class PositionSensorParams(Registers):
     delay: i8 = register("samples until a position is read", unit="count", range=(0, MEMORY - 1))
     span: i8 = register("number of samples of the velocity difference, 1 or more", unit="count", range=(1, MEMORY - 1))
     smoothing: f8 = register("part of a new velocity that is taken over at a sample; 1: no filter", unit="1")
+    unused: u1 = register(
+        "places of the memory that are not used: all but a power of two, more than delay and span together",
+        unit="count", range=(0, MEMORY - 1), option=True,
+    )  # fmt: skip
 
 
 class PositionSensor(Registers):
@@ -57,10 +61,11 @@ def shift_positions(r: PositionSensor, way: float) -> None:
 @step
 def read_word(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) -> None:
     """Sample: take the word of the encoder; one that is none leaves the position where it was."""
-    last, r.place = r.memory[r.place], (r.place + 1) % MEMORY
+    mask = MEMORY - 1 - p.unused
+    last, r.place = r.memory[r.place], (r.place + 1) & mask
     r.memory[r.place] = last if word.lost else position_of(p, r, word)
-    r.position = r.memory[(r.place - p.delay) % MEMORY]
-    before = r.memory[(r.place - p.delay - p.span) % MEMORY]
+    r.position = r.memory[(r.place - p.delay) & mask]
+    before = r.memory[(r.place - p.delay - p.span) & mask]
     r.velocity += p.smoothing * ((r.position - before) / (p.span * p.period) - r.velocity)
 
 
@@ -69,5 +74,5 @@ def stand_sensor(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) 
     """As if the encoder had shown this word for long."""
     r.position = position_of(p, r, word)
     r.velocity = 0.0
-    for k in range(MEMORY):
+    for k in range(MEMORY - p.unused):
         r.memory[k] = r.position

@@ -125,6 +125,7 @@ class Expressions(Integers):
         """What stands in a field."""
         if found.block is not None:
             return Value(kind="file", text="&" + place, registers=found.block)
+        found = self.program.shape.seen(registers, found)
         if found.width is None:
             raise outside_language(ast.Pass(), f"{place}, which has no width", "declare one")
         table = self.program.shape.tables.get((registers, found.name))

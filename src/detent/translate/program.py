@@ -308,7 +308,7 @@ class Program:
     def fields(self, registers: type[Registers]) -> list[Field]:
         """Fields of a class that its structure in C has."""
         return [
-            field
+            self.shape.seen(registers, field)
             for field in registers.__fields__.values()
             if not (self.is_folded(field.block) if field.block else self._is_elsewhere(registers, field))
         ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from detent.errors import DetentError
-from detent.kernel.registers import Registers, Width
+from detent.kernel.registers import Field, Registers, Width
 
 INTEGERS = {
     "u1": "uint8_t", "u2": "uint16_t", "u4": "uint32_t", "i1": "int8_t", "i2": "int16_t", "i4": "int32_t",
@@ -255,12 +255,20 @@ class Shape:
         default_factory=dict[Any, Any]
     )
     """Registers that are as wide, and hold as much, as this axis needs."""
+    lengths: Mapping[tuple[type[Registers], str], int] = field(default_factory=dict[Any, int])
+    """Arrays that are as long as this axis needs."""
     names: Mapping[Callable[..., Any], str] = field(default_factory=dict[Any, str])
     """Names in C of steps that are not those of the steps."""
     constants: Mapping[str, str] = field(default_factory=dict[str, str])
     """Names in C of numbers of a module that are not those of the numbers."""
     storage: str = ""  # of every function, where it is not that of an entry
     checks: bool = True  # claims can be checked by a build with FIRMWARE_CHECK
+
+    def seen(self, registers: type[Registers], declared: Field) -> Field:
+        """The declaration of a register as it is in C."""
+        place = registers, declared.name
+        width, claimed = self.narrowed.get(place, (declared.width, declared.range))
+        return replace(declared, width=width, range=claimed, length=self.lengths.get(place, declared.length))
 
 
 @dataclass

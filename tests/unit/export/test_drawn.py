@@ -24,6 +24,7 @@ from detent.kernel.image import add_bytes, begin_hash
 from detent.kernel.loop import controls
 from detent.kernel.registers import PLANT, Registers, i2, register
 from detent.kernel.step import step
+from detent.translate.values import Shape
 
 
 class Wires(Registers):
@@ -124,7 +125,7 @@ def test_a_folded_option_is_not_drawn_and_stays_what_it_is(chance):
 def test_integers_of_64_bits_stay_where_nothing_overflows():
     assert drawn_from(-(1 << 63), (1 << 63) - 1) == (-WIDE, WIDE)
     assert drawn_from(0, 255) == (0, 255)
-    rows = {row.path: row for row, _ in rows_of(State(), "c", {})}
+    rows = {row.path: row for row, _ in rows_of(State(), "c", {}, Shape())}
     assert (rows["count"].lo, rows["count"].hi) == (-WIDE, WIDE)
     assert (rows["place"].lo, rows["place"].hi) == (0, firmware_steps.PLACES - 1)
     assert rows["memory"].length == firmware_steps.PLACES

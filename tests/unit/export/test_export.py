@@ -56,20 +56,26 @@ def test_a_folded_option_is_a_row_of_the_parameters_without_an_expression(folder
     assert found["law.position_pid"]["expression"] == ""
     assert found["law.period"]["expression"] == "p->law.period"
     assert float(found["law.period"]["default"]) == 0.00025
-    assert found["motor_sensor.delay"]["range"] == "0 to 63"
+    # Its memory has two places, so neither delay nor span may grow.
+    assert (found["motor_sensor.delay"]["range"], found["motor_sensor.span"]["range"]) == ("0 to 0", "1 to 1")
+    assert found["motor_sensor.unused"]["expression"] == ""
     header = (folder / "cascade_axis.h").read_text()
     assert "position_pid" not in header
     assert "position_on_load" not in header
 
 
+def fitted(axis):
+    return unit_of(axis).fitted(build_cascade(axis.spec).controller)
+
+
 def test_every_register_has_its_number_and_its_writer(folder, axis):
     found = rows(folder, "registers.csv")
-    assert [int(row["number"]) for row in found] == list(range(len(unit_of(axis).leaves)))
+    assert [int(row["number"]) for row in found] == list(range(len(fitted(axis).leaves)))
     by = {row["name"]: row["written_by"] for row in found}
     assert by["lines.motor.count"] == "plant"
     assert by["lines.command"] == "controller"
     assert by["controller.on"] == ""
-    leaves = [leaf for leaf in unit_of(axis).leaves if leaf.range is not None]
+    leaves = [leaf for leaf in fitted(axis).leaves if leaf.range is not None]
     assert leaves
     for leaf in leaves:
         name = ("controller" if leaf.path[0] == "c" else "lines") + leaf.path[1:]
@@ -127,7 +133,7 @@ def parsed(data: bytes, leaves, signals=(8, 8, 8, 8), calls=()):
 
 
 def test_the_vectors_hold_every_tick_and_a_check_every_thousand(folder, axis):
-    leaves = unit_of(axis).leaves
+    leaves = fitted(axis).leaves
     data, unit_calls = (folder / "vectors/job.vec").read_bytes(), axis.method.actions
     assert data[:5] == b"DTNV\2"
     found = list(parsed(data, leaves, calls=list(unit_of(axis).calls.values())))
@@ -148,7 +154,7 @@ def test_the_vectors_hold_every_tick_and_a_check_every_thousand(folder, axis):
 def test_the_hash_is_fnv_1a_over_the_image_of_the_state(axis):
     unit = unit_of(axis)
     golden = record(unit, axis, axis.method.trial_job(axis.spec), 1)
-    found = dict(parsed(golden.vectors(), unit.leaves, calls=list(unit.calls.values())))
+    found = dict(parsed(golden.vectors(), golden.unit.leaves, calls=list(unit.calls.values())))
     wanted = FNV_BASIS
     for byte in found[CHECK][1]:
         wanted = (wanted ^ byte) * FNV_PRIME & WHOLE
@@ -245,7 +251,7 @@ def test_a_parameter_outside_its_range_is_found(axis):
 def test_an_option_that_differs_between_two_blocks_stays_a_parameter():
     p = CascadeControllerParams()
     assert {name for _, name in options_of(p)} == {
-        "position_on_load", "velocity_on_load", "position_pid", "place_on_load", "present",
+        "position_on_load", "velocity_on_load", "position_pid", "place_on_load", "present", "unused",
     }  # fmt: skip
 
 

@@ -123,8 +123,10 @@ def test_patterns_choose_what_is_a_constant(axis):
     names = {key: {name for _, name in folded(params, *how)} for key, how in {
         "none": (), "tunable": (["law.position_pid", "feedback.*"],), "fixed": ((), ["limits.*"]),
     }.items()}  # fmt: skip
-    assert names["none"] == {"position_on_load", "velocity_on_load", "position_pid", "place_on_load", "present"}
-    assert names["tunable"] == {"place_on_load", "present"}
+    assert names["none"] == {
+        "position_on_load", "velocity_on_load", "position_pid", "place_on_load", "present", "unused",
+    }  # fmt: skip
+    assert names["tunable"] == {"place_on_load", "present", "unused"}
     assert names["fixed"] == names["none"] | {
         "following_error", "lowest", "highest", "breaking", "window", "arrival",
     }  # fmt: skip

@@ -81,7 +81,7 @@ def test_fw11_is_an_axis_that_fails_its_check(tmp_path, monkeypatch, capsys):
 
 
 def test_fw12_tells_the_value_and_its_range(cascade, tmp_path, monkeypatch):
-    monkeypatch.setattr("detent.export.write.outside_ranges", lambda _: iter([("law.period", 7, (0, 5))]))
+    monkeypatch.setattr("detent.export.write.outside_ranges", lambda *_: iter([("law.period", 7, (0, 5))]))
     place = tmp_path / "out"
     refused("FW12", "law.period = 7; expected: 0 to 5", lambda: export_firmware(cascade, place, ticks=10))
     assert not place.exists()

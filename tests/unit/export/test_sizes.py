@@ -44,6 +44,65 @@ def test_the_deepest_path_counts_and_what_falls_through_goes_on():
     assert known["t_inner"].calls == set()
 
 
+LARGE_FRAMES = """
+00000000 <m0_large>:
+       0:	b5f0      	push	{r4, r5, r6, r7, lr}
+       2:	4c05      	ldr	r4, [pc, #20]	@ (18 <m0_large+0x18>)
+       4:	44a5      	add	sp, r4
+       6:	4b04      	ldr	r3, [pc, #16]	@ (1c <m0_large+0x1c>)
+       8:	2300      	movs	r3, #0
+       a:	449d      	add	sp, r3
+       c:	4b03      	ldr	r3, [pc, #12]	@ (1c <m0_large+0x1c>)
+       e:	469d      	add	sp, r3
+      10:	bdf0      	pop	{r4, r5, r6, r7, pc}
+      18:	ffffeda4 	.word	0xffffeda4
+      1c:	0000125c 	.word	0x0000125c
+
+00000040 <rv_large>:
+      40:	d6010113          	add	sp,sp,-672
+      44:	72fd                	lui	t0,0xfffff
+      46:	9116                	add	sp,sp,t0
+      48:	8082                	ret
+"""
+AVR = """
+00000100 <a_control>:
+     100:	cf 93       	push	r28
+     102:	df 93       	push	r29
+     104:	00 d0       	rcall	.+0      	; 0x106 <a_control+0x6>
+     106:	cd b7       	in	r28, 0x3d	; 61
+     108:	de b7       	in	r29, 0x3e	; 62
+     10a:	2a 97       	sbiw	r28, 0x0a	; 10
+     10c:	0e 94 a0 00 	call	0x140	; 0x140 <a_inner>
+     110:	2a 96       	adiw	r28, 0x0a	; 10
+     112:	08 95       	ret
+
+00000140 <a_inner>:
+     140:	cd b7       	in	r28, 0x3d	; 61
+     142:	cc 52       	subi	r28, 0x2C	; 44
+     144:	d1 40       	sbci	r29, 0x01	; 1
+     146:	c4 5d       	subi	r28, 0xD4	; 212
+     148:	de 4f       	sbci	r29, 0xFE	; 254
+     14a:	08 95       	ret
+
+00000150 <a_leaf>:
+     150:	21 97       	sbiw	r28, 0x01	; 1
+     152:	08 95       	ret
+"""
+
+
+def test_a_frame_that_no_instruction_can_name_is_that_of_a_register():
+    known = routines(LARGE_FRAMES)
+    assert {name: one.frame for name, one in known.items()} == {"m0_large": 20 + 0x125C, "rv_large": 672 + 4096}
+
+
+def test_an_avr_leaves_the_way_back_on_the_stack_and_lowers_a_copy_of_its_pointer():
+    known = routines(AVR, back=3)
+    assert {name: one.frame for name, one in known.items()} == {
+        "a_control": 3 + 2 + 3 + 10, "a_inner": 3 + 0x12C, "a_leaf": 3,
+    }  # fmt: skip
+    assert deepest("a_control", known) == 18 + 303
+
+
 def test_a_routine_brings_all_that_it_calls():
     known = routines(LISTING)
     assert reached(["__aeabi_dsub", "gone"], known) == {"__aeabi_dadd": 0x166 - 0x160, "__aeabi_dsub": 0x10}

@@ -24,10 +24,17 @@ from detent.control.guard import (
 )
 from detent.control.supervision import Supervision, SupervisionParams, supervise, warm_up
 from detent.kernel.loop import HostArray, controls, f8_signal
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
+from detent.kernel.registers import CONTROLLER, PLANT, Fit, Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.sensing.home_marks import EndWires, HomeWires
-from detent.sensing.position_sensor import EncoderWord, PositionSensor, PositionSensorParams, read_word, stand_sensor
+from detent.sensing.position_sensor import (
+    MEMORY,
+    EncoderWord,
+    PositionSensor,
+    PositionSensorParams,
+    read_word,
+    stand_sensor,
+)
 
 ARRIVED, FAULT = 1, 2  # events
 
@@ -296,6 +303,25 @@ def sample(
     if p.brake.present:
         release(p.brake, c.brake, c.on)
         lines.brake = c.on
+
+
+def fit(p: CascadeControllerParams) -> Fit:
+    """How many positions both encoders keep: delay, span and the one of now, up to a power of two.
+
+    A delay may still grow into what is left, a span may not: together they always fit.
+    """
+    sensors = p.motor_sensor, p.load_sensor
+    delay, span = (max(getattr(one, name) for one in sensors) for name in ("delay", "span"))
+    places = min(1 << (delay + span).bit_length(), MEMORY)
+    unused, kind = MEMORY - places, PositionSensorParams
+    return Fit(
+        {(PositionSensor, "memory"): places},
+        {
+            (PositionSensor, "place"): (0, places - 1), (kind, "unused"): (unused, unused),
+            (kind, "delay"): (0, max(0, places - 1 - span)), (kind, "span"): (1, max(1, span)),
+        },
+        {(kind, "unused"): unused},
+    )  # fmt: skip
 
 
 @controls(CascadeControllerParams)

@@ -33,6 +33,7 @@ class CascadeMethod(Method[CascadeSpec]):
         "power_on", "engage", "guard_axis", "begin", "arrive_within", "take_event", "coast", "forget_peaks",
         "forget_following", "forget_conduct",
     )  # fmt: skip
+    fits = "controller:fit"
     signals = "run:CASCADE_SIGNALS"
     timing = (
         "controller.left", "controller.reference.position", "lines.motor.count", "controller.motor_sensor.velocity",

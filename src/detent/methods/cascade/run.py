@@ -12,7 +12,7 @@ from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.controller import ARRIVED, FAULT, coast, forget_following, forget_peaks
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.moves.changes import lay_changes
+from detent.methods.changes import lay_changes
 from detent.methods.moves.job import Move, MoveJob
 from detent.methods.moves.run import time_to_settle
 from detent.planning.profile import plan_move
@@ -132,7 +132,7 @@ def run_cascade_moves(
     """
     targets = check_cascade_job(spec, job)
     host = CascadeHost(spec, recorder)
-    lay_changes(host.machine, job.changes, job.name)
+    lay_changes({"": host.machine}, job)
     evidence = Evidence(
         host.controller.guard, host.period, spec.encoder.resolution, spec.method.in_position, spec.unit("m"),
         forget=host.forget,

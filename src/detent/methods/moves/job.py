@@ -12,13 +12,14 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
-from detent.files.fields import Table, optional, required, rows
+from detent.files.fields import optional, rows
 from detent.files.quantities import Angle, AngularVelocity, Length, Time, Velocity
 from detent.files.read import Row, check_values, read_tables
 from detent.files.read_csv import CsvRows
 from detent.files.screen import OnScreen
 from detent.files.source import parse_source
 from detent.files.text import decode_utf8, read_data
+from detent.methods.changes import Changing, ParameterChange, read_changes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,20 +62,11 @@ class RotaryMoveRow(MoveRow, frozen=True):
     speed: AngularVelocity | None = optional("speed of this move", None, derived="the axis's own", gt=0)
 
 
-class ChangeRow(Table, frozen=True):
-    """A change of a parameter as a file says it."""
-
-    time: Time = required("time since power-on", "1 s", ge=0)
-    name: str = required("parameter of the controller, as in params.csv of an export", "law.cascade.position_gain")
-    value: float = required("its value from then on, in the unit of params.csv", "45.0")
-
-
-class MoveFile(Table, Generic[AnyRow], frozen=True):
+class MoveFile(Changing, Generic[AnyRow], frozen=True):
     """A file of moves."""
 
     repeat: int = optional("number of repetitions of the whole list", 1, ge=1, le=MOST_MOVES)
     move: list[AnyRow] = rows("a move")
-    parameter_change: list[ChangeRow] = rows("a parameter of the controller that changes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,16 +97,6 @@ class Move:
         """Refuse what no axis could do."""
         names = ("target", "by", "dwell", "speed", "sample_period")
         check_values(MoveRow, f"move {self.number}", {name: getattr(self, name) for name in names})
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterChange:
-    """A parameter of the controller that has another value from a time on."""
-
-    row: int  #: line of the file, from 1
-    time: float  #: since power-on [s], 0 or more
-    name: str  #: as `detent export firmware` lists it in params.csv
-    value: float  #: in the unit of that list
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -258,10 +240,7 @@ def _parse_moves(file: Path, text: str, model: type[MoveRow]) -> MoveJob:
         found = read_tables(source, MoveFile[model])
         repeat = found.repeat
         made = [_make_move(source.line_of("move", number), row) for number, row in enumerate(found.move)]
-        changes = tuple(
-            ParameterChange(source.line_of("parameter_change", number), **row.model_dump())
-            for number, row in enumerate(found.parameter_change)
-        )
+        changes = read_changes(source, found)
     return MoveJob(file.name, "moves", expand_moves(str(file), made, repeat), changes)
 
 

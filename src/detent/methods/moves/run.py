@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 from detent.errors import MOST_PROBLEMS, AxisError, FileProblem, InputError
-from detent.methods.moves.changes import lay_changes
+from detent.methods.changes import lay_changes
 from detent.methods.moves.job import Move, MoveJob
 from detent.record.machine import Machine, Progress
 from detent.record.run import Evidence, RunRecord
@@ -238,7 +238,7 @@ def run_moves(host: Host, job: MoveJob, *, progress: Progress | None = None) -> 
     """Make a list of moves on an axis, from power-on."""
     result = MoveRun(job, tolerance=host.tolerance, grid=host.grid)
     destinations = check_job(host, job)
-    lay_changes(host.machine, job.changes, job.name)
+    lay_changes({"": host.machine}, job)
     try:
         host.start()
         result.time_ready = host.machine.time

@@ -36,7 +36,7 @@ from detent.control.phase_sequencer import (
 )
 from detent.kernel.compiled import unlikely
 from detent.kernel.loop import controls
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u2
+from detent.kernel.registers import CONTROLLER, PLANT, Fit, Registers, block, i1, i4, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
 from detent.sensing.counted_speed import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.home_marks import HomeLevels
@@ -193,6 +193,12 @@ def sample(p: PhaseControllerParams, c: PhaseController, lines: PhaseLines) -> N
     if unlikely(sample_strobe(p.clocks, c.clocks)):
         sample_speed(p, c, lines)
         protect(p, c, lines)
+
+
+def fit(p: PhaseControllerParams) -> Fit:
+    """How much of its velocity table the servo uses."""
+    last = p.sequencer.last
+    return Fit({(SequencerParams, "table"): last + 1}, {(SequencerParams, "last"): (0, last)})
 
 
 @controls(PhaseControllerParams)

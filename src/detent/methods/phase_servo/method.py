@@ -41,6 +41,7 @@ class PhaseServoMethod(MoveMethod[PhaseServoSpec]):
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:PhaseServo", "system:PhaseServoParams"
     actions = ("power_on", "command", "acquire", "take_ready", "arrive_within", "forget_conduct")
+    fits = "controller:fit"
     every = 256
     seed = "detector.seed"
     signals, timing = SIGNALS, TIMING

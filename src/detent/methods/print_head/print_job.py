@@ -1,16 +1,22 @@
 """Print jobs: read a file, find out what it is, and say which character stands where.
 
 Two kinds of job are read: plain text (ten characters and six lines per inch), and streams for the Diablo 630
-daisy-wheel printer (`diablo630`). The content decides, not the name of the file.
+daisy-wheel printer (`diablo630`). The content decides, not the name of the file. A TOML file names one of these, and
+the parameters that change while it is printed.
 """
 
 import re
 import unicodedata
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
 from detent.errors import InputError
-from detent.files.text import MAX_BYTES, reading, refuse_longer
+from detent.files.fields import required
+from detent.files.read import read_tables
+from detent.files.source import parse_source
+from detent.files.text import MAX_BYTES, read_text, reading, refuse_longer
+from detent.methods.changes import Changing, read_changes
 from detent.methods.print_head.diablo630 import parse_diablo
 from detent.methods.print_head.printed_page import LINE, WHEEL_PITCH, PrintedCharacter, PrintJob, Reading
 
@@ -25,16 +31,31 @@ _MAX_MEANINGLESS_SHARE = 0.1
 _WHAT_A_JOB_IS = "a text file, or a stream for the Diablo 630 printer"
 
 
+class PrintFile(Changing, frozen=True):
+    """A file to print, and parameters that change meanwhile."""
+
+    print: str = required("file to print, from where this file is", '"letter.txt"')
+
+
 def load_job(path: str | PathLike[str]) -> PrintJob:
     """Read a print job."""
     file = Path(path)
+    if file.suffix.lower() != ".toml":
+        return _load_print(file)
+    source = parse_source(str(file), read_text(file, (".toml",), "a file to print, and what changes meanwhile (.toml)"))
+    found = read_tables(source, PrintFile)
+    return replace(_load_print(file.parent / found.print), name=file.name, changes=read_changes(source, found))
+
+
+def _load_print(file: Path) -> PrintJob:
+    """Read what is to be printed."""
     limit = MAX_BYTES[".txt"]  # whatever the name ends in
     with reading(file, _WHAT_A_JOB_IS, "check the name after --job"), file.open("rb") as stream:
         data = stream.read(limit + 1)
     refuse_longer(file, data, limit, "divide the job among several files")
     if _CONTROL_BYTE.search(data.rstrip(b"\x1a")):
         job = parse_diablo(data, file.name)
-        _refuse_rubbish(job, data, str(path))
+        _refuse_rubbish(job, data, str(file))
     else:
         try:
             job = parse_text(data.decode("utf-8"), file.name)
@@ -43,7 +64,7 @@ def load_job(path: str | PathLike[str]) -> PrintJob:
     if not job.lines:
         got = "an empty file" if not data else f"{len(data)} bytes without a printable character"
         raise InputError.of_file(
-            str(path), got, "a job with at least one character to print", "add some text, or name another file"
+            str(file), got, "a job with at least one character to print", "add some text, or name another file"
         )
     return job
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from detent.files.screen import OnScreen
+from detent.methods.changes import ParameterChange
 
 WHEEL_PITCH = 12  # columns of a glyph on a ten-pitch wheel: its ink where the spacing says nothing about the glyph
 NARROWEST_PITCH = 6  # columns of the narrowest pitch, twenty characters per inch
@@ -123,6 +124,7 @@ class PrintJob(OnScreen):
     accepted: dict[str, int]  # codes understood that change neither where nor what is printed, and how often
     length_bytes: int  # length of the file [byte]
     account: ByteAccount  # where the bytes went
+    changes: tuple[ParameterChange, ...] = ()  # parameters of the controller that change on the way
 
     @property
     def characters(self) -> int:

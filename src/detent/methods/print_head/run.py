@@ -19,6 +19,7 @@ from detent.control.head_computer import IMPLAUSIBLE, LOWEST_FAST_PASS, OBSTRUCT
 from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, describe_sb1
 from detent.files.quantities import INCH
+from detent.methods.changes import lay_changes
 from detent.methods.print_head import system as print_head
 from detent.methods.print_head.build import build_print_head
 from detent.methods.print_head.controller import load_line
@@ -366,6 +367,7 @@ class SimulatedPrinting(Printing):
 
     def __init__(self, spec: PrintHeadSpec, job: PrintJob, recorder: AnyRecorder | None, progress: Progress) -> None:
         self.machine, self.progress = print_head_machine(spec, recorder), progress
+        lay_changes({"": self.machine}, job)
         super().__init__(spec, job, self.machine.params, self.machine.state)
         pass_time, controller = self.machine.pass_time, self.state.controller
         self.supervisor = Supervisor(controller, pass_time, self.on_answer, spec.method.ack_last, act=self.machine.act)

@@ -6,9 +6,16 @@ timer task. What holds the dial, the buttons and the position number is the host
 
 from detent.control import guard
 from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch
-from detent.control.table_positioner import Positioner, PositionerParams, begin_task, end_task, interrupt
+from detent.control.table_positioner import (
+    Positioner,
+    PositionerParams,
+    PositionTable,
+    begin_task,
+    end_task,
+    interrupt,
+)
 from detent.kernel.loop import controls
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u4
+from detent.kernel.registers import CONTROLLER, PLANT, Fit, Registers, block, i1, i4, i8, register, u1, u4
 from detent.kernel.step import hot_step, step
 from detent.sensing.resolver_counter import AbsoluteAngle, CompositionParams, compose
 
@@ -109,6 +116,13 @@ def serve(p: TableControllerParams, c: TableController, lines: TableLines) -> No
     if task:
         end_task(p.positioner, c.positioner)
     clocks.wake = min(clocks.strobe, clocks.interrupt, clocks.task)
+
+
+def fit(p: TableControllerParams) -> Fit:
+    """How much of its position table an axis uses."""
+    entries = max(1, p.positioner.pdt.entries)
+    columns = ("angle", "speed", "policy")
+    return Fit({(PositionTable, one): entries for one in columns}, {(PositionTable, "entries"): (0, entries)})
 
 
 @controls(TableControllerParams)

@@ -24,6 +24,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     actions = (
         "power_on", "dial", "press", "release", "position", "acknowledge", "arrive_within", "forget_conduct",
     )  # fmt: skip
+    fits = "controller:fit"
     every = 20
     seed = "detector.seed"
     signals = "run:SEQUENCE_SIGNALS"

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from detent.errors import AxisError
 from detent.kernel.turn_table import TURN
+from detent.methods.changes import lay_changes
 from detent.methods.rotary_table.host import TableHost, check_sequence, dial_speed
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change, SequenceController, suspect
@@ -112,6 +113,7 @@ def run_sequence(
     check_sequence(spec, job)
     result = SequenceRun(job, count=spec.count, in_position=spec.method.in_position * spec.count)
     host = TableHost(spec, recorder)
+    lay_changes({"": host.machine}, job)
     try:
         host.start()
         result.time_ready = host.machine.time

@@ -19,6 +19,7 @@ from detent.files.fields import optional, required
 from detent.files.quantities import AngularVelocity, Time
 from detent.files.read import Row, check_values
 from detent.files.screen import OnScreen
+from detent.methods.changes import ParameterChange
 
 MOST_STEPS = 100_000  # steps of a job at most, repeats counted
 LONGEST_TIME = 1e5  # longest wait, longest jog and latest input of a job [s]: more than a day
@@ -215,6 +216,7 @@ class SequenceJob(OnScreen):
     #: per input signal the stretches in which it is on [s since the start of the sequence], see `join_stretches`
     inputs: dict[str, Stretches] = field(default_factory=dict[str, Stretches])
     kind: str = "sequence"
+    changes: tuple[ParameterChange, ...] = ()  #: parameters of the controller that change on the way
 
     @property
     def count(self) -> int:

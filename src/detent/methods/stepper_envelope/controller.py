@@ -20,7 +20,7 @@ from detent.control.step_rule import (
 )
 from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, word_within
 from detent.kernel.loop import HostArray, controls, i2_signal
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u2, u4
+from detent.kernel.registers import CONTROLLER, PLANT, Fit, Registers, block, i1, i4, i8, register, u1, u2, u4
 from detent.kernel.step import bounded, hot_step, step
 from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
 from detent.planning.step_ramp import StepRamp
@@ -172,6 +172,20 @@ def control(
     while running and c.timer.expires <= c.now:
         running = next_period(p, c, lines, up, down)
     c.now += p.instant_ticks
+
+
+def fit(p: StepperControllerParams) -> Fit:
+    """How much of its ramp list a motor uses: up to a power of two, for the index of any entry is masked."""
+    top = (1 << p.rule.last.bit_length()) - 1
+    inside, running = (0, top), (-1, top)
+    return Fit(
+        {(StepRuleParams, "ramp"): top + 1},
+        {
+            (StepRuleParams, "last"): inside, (StepRuleParams, "index_mask"): inside,
+            (StepRule, "index"): running, (StepRule, "request"): running,
+        },
+        {(StepRuleParams, "index_mask"): top},
+    )  # fmt: skip
 
 
 def load_rule(

@@ -39,6 +39,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     state, params = "system:Stepper", "system:StepperParams"
     actions = ("place", "start", "deflect", "release", "reset", "acknowledge", "call_at")
     interrupts = ("next_period",)
+    fits = "controller:fit"
     every = 100
     takes, runs = "stage_job:StageJob", "run:run_stage"
     searches = "tuning:StageSearch"

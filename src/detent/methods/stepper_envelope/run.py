@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from detent.errors import AxisError
+from detent.methods.changes import lay_changes
 from detent.methods.stepper_envelope.build import start_hz, stepper_motor
 from detent.methods.stepper_envelope.host import Leg, StageHost, StageMotor, check_stage_job
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
@@ -157,6 +158,7 @@ def run_stage(
     """Do a job on the stage of `spec`, from power-on."""
     check_stage_job(spec, job)
     host, result = StageHost(spec, recorder), StageRun(job, lost=dict.fromkeys(spec.stepper, 0))
+    lay_changes({name: motor.machine for name, motor in host.stage.motors.items()}, job)
     try:
         for done, move in enumerate(job.moves):
             result.moves.append(_make_move(host, move, result))

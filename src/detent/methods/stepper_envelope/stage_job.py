@@ -37,6 +37,7 @@ from detent.files.read_csv import Column, CsvRows, split_heading
 from detent.files.screen import OnScreen
 from detent.files.source import parse_source
 from detent.files.text import MAX_SHOWN, read_text, short
+from detent.methods.changes import ParameterChange, read_changes
 from detent.methods.moves.job import MOST_MOVES, MoveFile, expand_moves
 from detent.units import QuantityError, describe_kind, parse_quantity
 
@@ -352,6 +353,8 @@ class StageJob(OnScreen):
         Motors that the job names, in the order of the axis file.
     notes : tuple of str
         What the reader of the file chose, to be told to the user, such as the columns it took.
+    changes : tuple of ParameterChange
+        Parameters of the motors' controllers that change on the way, each by the name of its motor and its own.
     """
 
     name: str
@@ -359,6 +362,7 @@ class StageJob(OnScreen):
     moves: tuple[StageMove | StageJog, ...]
     motors: tuple[str, ...]
     notes: tuple[str, ...] = ()
+    changes: tuple[ParameterChange, ...] = ()
 
     @property
     def count(self) -> int:
@@ -373,7 +377,7 @@ def load_stage_job(path: str | PathLike[str], motors: Sequence[str], turning: fr
     """Read the job of a stepper stage with these motors, of which some turn; that it can do it is not checked here."""
     file = Path(path)
     text = read_text(file, (".csv", ".toml"), "a list of places (.csv) or of moves (.toml)")
-    repeat, kind, notes = 1, "moves", ()
+    repeat, kind, notes, changes = 1, "moves", (), ()
     if file.suffix.lower() == ".csv":
         table = PlaceRows(str(file), text, stage_row(tuple(motors), PlaceRow, turning))
         made = table.read(_make_move, MOST_MOVES)
@@ -383,10 +387,10 @@ def load_stage_job(path: str | PathLike[str], motors: Sequence[str], turning: fr
         model: Any = stage_row(tuple(motors), StageRow, turning)
         found = read_tables(source, cast("type[MoveFile[StageRow]]", MoveFile[model]))
         made = [_make_move(source.line_of("move", number), row) for number, row in enumerate(found.move)]
-        repeat = found.repeat
+        repeat, changes = found.repeat, read_changes(source, found)
     moves = expand_moves(str(file), made, repeat, missing=f"add a move with a place for {' or '.join(motors)}")
     named = {motor for move in moves for motor in move.motors}
-    return StageJob(file.name, kind, moves, tuple(motor for motor in motors if motor in named), notes)
+    return StageJob(file.name, kind, moves, tuple(motor for motor in motors if motor in named), notes, changes)
 
 
 def _make_move(line: int, row: StageRow) -> tuple[StageMove | StageJog, int]:

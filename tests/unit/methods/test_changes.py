@@ -4,10 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
+import detent
 from detent.errors import InputError
 from detent.kernel.registers import Registers, block, f8, i1, i2_array, i8, register, u1
-from detent.methods.moves.changes import lay_changes
-from detent.methods.moves.job import ParameterChange, load_moves
+from detent.methods.changes import ParameterChange, changes_of, lay_changes
+from detent.methods.moves.job import load_moves
 from detent.record.machine import Machine
 
 
@@ -45,10 +46,14 @@ def machine(recorder=None):
     return Machine(params, state, 0.5, recorder, advance=advance), seen
 
 
+def lay(made, *changes: ParameterChange) -> None:
+    lay_changes({"": made}, SimpleNamespace(name="job.toml", changes=changes))
+
+
 def test_a_parameter_has_its_value_from_its_tick_on():
     made, seen = machine()
     changes = [ParameterChange(4, 3.0, "law.gain", 7.0), ParameterChange(1, 1.5, "law.gain", 5.0)]
-    lay_changes(made, changes, "job.toml")
+    lay(made, *changes)
     assert made.pass_ticks(10) == 10
     assert seen == [0.0] * 3 + [5.0] * 3 + [7.0] * 4
     assert made.changes == []
@@ -56,7 +61,7 @@ def test_a_parameter_has_its_value_from_its_tick_on():
 
 def test_a_change_at_power_on_is_there_in_the_first_tick():
     made, seen = machine()
-    lay_changes(made, [ParameterChange(1, 0.0, "law.gain", 2.0)], "job.toml")
+    lay(made, ParameterChange(1, 0.0, "law.gain", 2.0))
     made.pass_ticks(2)
     assert seen == [2.0, 2.0]
 
@@ -76,9 +81,48 @@ def test_a_change_at_power_on_is_there_in_the_first_tick():
 def test_what_does_not_fit_is_refused_with_its_line_and_nothing_is_laid(name, value, told):
     made, _ = machine()
     with pytest.raises(InputError) as caught:
-        lay_changes(made, [ParameterChange(9, 1.0, name, value), ParameterChange(1, 0.0, "law.gain", 2.0)], "job.toml")
+        lay(made, ParameterChange(9, 1.0, name, value), ParameterChange(1, 0.0, "law.gain", 2.0))
     assert f"job.toml:9:1 {'value' if '=' in told else 'name'}: got {told}" in str(caught.value)
     assert made.changes == []
+
+
+def test_of_several_motors_each_has_its_own_changes():
+    one, seen_by_one = machine()
+    two, seen_by_two = machine()
+    told = (ParameterChange(1, 1.0, "b.law.gain", 3.0), ParameterChange(5, 0.5, "b.law.gain", 2.0))
+    job = SimpleNamespace(name="job.toml", changes=told)
+    lay_changes({"a": one, "b": two}, job)
+    assert [change.value for change in changes_of(job, "b")] == [2.0, 3.0]
+    one.pass_ticks(3)
+    two.pass_ticks(3)
+    assert (seen_by_one, seen_by_two) == ([0.0] * 3, [0.0, 2.0, 3.0])
+    wrong = SimpleNamespace(name="job.toml", changes=(ParameterChange(7, 0.0, "law.gain", 2.0),))
+    with pytest.raises(
+        InputError, match=r"job\.toml:7:1 name: got law\.gain, of no motor; expected: one of a, b and a"
+    ):
+        lay_changes({"a": one, "b": two}, wrong)
+
+
+@pytest.mark.parametrize(
+    ("method", "text"),
+    [
+        ("cascade", '[[move]]\nby = "1 mm"\n'),
+        ("filtered_servo", '[[move]]\nby = "1 mm"\n'),
+        ("phase_servo", '[[move]]\ntarget = "5.08 mm"\n'),
+        ("rotary_table", "[[step]]\ngo = 1\n"),
+        ("zoom", '[[move]]\ngroup_a = "5 mm"\n'),
+        ("print_head", 'print = "line.txt"\n'),
+    ],
+)
+def test_every_method_reads_them_from_its_job_and_refuses_a_name_that_is_none(method, text, tmp_path):
+    (tmp_path / "line.txt").write_text("a line")
+    file, motor = tmp_path / "job.toml", "group_a." if method == "zoom" else ""
+    file.write_text(f'{text}\n[[parameter_change]]\ntime = "1 ms"\nname = "{motor}gone"\nvalue = 3\n')
+    axis = detent.load(detent.example(f"{method}.toml"))
+    job = axis.load_job(file)
+    assert job.changes == (ParameterChange(text.count("\n") + 2, 0.001, f"{motor}gone", 3.0),)
+    with pytest.raises(InputError, match=rf"job\.toml:{job.changes[0].row}:1 name: got {motor}gone, which is none"):
+        axis.run(job)
 
 
 def test_a_file_tells_time_name_value_and_its_line(tmp_path):
