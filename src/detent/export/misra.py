@@ -45,14 +45,15 @@ def missing() -> str:
 def findings(folder: str | Path, name: str) -> list[Finding]:
     """Places of an export that break a rule of MISRA C:2012, as far as cppcheck knows these rules, by file and line.
 
-    The sources that become firmware are looked at, with the hash of the registers and the self-test, for a processor of 32 bits, in every
-    configuration that they have; the programs that prove them are not. `folder` is what `export_firmware` wrote, `name`
+    The sources that become firmware are looked at, with the hash of the registers and the self-test, for a processor of
+    32 bits, in every configuration that they have; the programs that prove them are not. `folder` is what `export_firmware` wrote, `name`
     the prefix of all names in C. A DetentError says that there is no cppcheck, or what it could not read.
     """
     place = Path(folder)
     if missing():
         raise DetentError(f"got no {TOOL}; expected: it on the path; try: apt install {PACKAGE}")
-    files = [file for part in ("", "_params", "_tables", "_image", "_selftest") if (place / (file := f"{name}{part}.c")).is_file()]
+    names = (f"{name}{part}.c" for part in ("", "_params", "_tables", "_image", "_selftest"))
+    files = [file for file in names if (place / file).is_file()]
     command = [
         TOOL, "--addon=misra", "--std=c99", "--platform=unix32", "--force", "--quiet", "--error-exitcode=0",
         "--suppress=missingIncludeSystem", "--template={file}:{line}: {id}", *files,
