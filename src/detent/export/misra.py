@@ -46,8 +46,9 @@ def findings(folder: str | Path, name: str) -> list[Finding]:
     """Places of an export that break a rule of MISRA C:2012, as far as cppcheck knows these rules, by file and line.
 
     The sources that become firmware are looked at, with the hash of the registers and the self-test, for a processor of
-    32 bits, in every configuration that they have; the programs that prove them are not. `folder` is what `export_firmware` wrote, `name`
-    the prefix of all names in C. A DetentError says that there is no cppcheck, or what it could not read.
+    32 bits, in every configuration that they have; the programs that prove them are not. `folder` is what
+    `export_firmware` wrote, `name` the prefix of all names in C. A DetentError says that there is no cppcheck, or what
+    it could not read.
     """
     place = Path(folder)
     if missing():
