@@ -346,7 +346,7 @@ def test_21_nothing_is_written_and_little_is_taken_from_a_library(exported, tmp_
 
 LANGUAGE = re.compile(
     r"_((floor_div|floor_mod|shift_left|shift_down|shift_right|abs|min|max|wrap|wrap_add|wrap_sub|wrap_mul)"
-    r"_(int|i\d+|f8)|\w+_of_(int|[iu]\d+)|to_i64|floor|power_of_two|bits_of|claimed|check_params|selftest)$"
+    r"_(int|i\d+|f8)|\w+_of_(int|unsigned|[iu]\d+)|to_i64|floor|power_of_two|bits_of|claimed|check_params|selftest)$"
 )
 """What is no step: an operator of Python, and the two questions about a set of parameters and a build."""
 
