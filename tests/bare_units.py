@@ -143,6 +143,17 @@ def next_(p: stepper.StepperControllerParams, c: stepper.StepperController, up: 
     return outcome
 
 
+JOBS = {
+    "cascade": "slide_moves.toml",
+    "filtered_servo": "slide_moves.toml",
+    "phase_servo": "moves.csv",
+    "rotary_table": "index_sequence.toml",
+    "zoom": "zoom_sequence.toml",
+    "print_head": "letter.txt",
+}
+"""Packaged axes, and their jobs."""
+MOTORS = {"zoom": "group_a"}
+
 ENTRIES: dict[str, dict[str, Callable[..., Any]]] = {
     "cascade": {"power_on": cascade_power_on, "refer": refer, "sample": sample},
     "filtered_servo": {
@@ -169,10 +180,21 @@ ENTRIES: dict[str, dict[str, Callable[..., Any]]] = {
 """Of each method: entries by their names."""
 
 
-def bare_code(method: str, unit: ControlUnit, params: Registers) -> str:
-    """The C of such a unit, as one file."""
+def bare_program(method: str, unit: ControlUnit, params: Registers) -> Program:
+    """Such a unit, translated."""
     roots = {unit.params: "params", unit.controller: "controller", unit.lines: "lines"}
     entries = {f"bare_{name}": entry for name, entry in ENTRIES[method].items()}
-    program = Program("bare", entries, unit.params, folded(params), roots)
+    return Program("bare", entries, unit.params, folded(params), roots)
+
+
+def bare_header(program: Program, unit: ControlUnit) -> str:
+    """Its structures, and prototypes of its entries."""
     structs = struct_texts(program, (unit.params, unit.controller, unit.lines)) + signals_text(program)
-    return "#include <stdbool.h>\n#include <stdint.h>\n" + structs + code_text(program)
+    prototypes = "".join(f"{program.signature(f)};\n" for f in program.steps.values() if f.entry)
+    return f"#include <stdbool.h>\n#include <stdint.h>\n{structs}{prototypes}"
+
+
+def bare_code(method: str, unit: ControlUnit, params: Registers) -> str:
+    """The C of such a unit, as one file."""
+    program = bare_program(method, unit, params)
+    return bare_header(program, unit) + code_text(program)

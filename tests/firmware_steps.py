@@ -132,7 +132,19 @@ def signs(p: Limits, r: State, _a: int, _b: int) -> None:
     r.other = p.form >> p.shift
 
 
-ACCEPTED = (arithmetic, conditions, floats, loops, effects, kept_calls, signs)
+def lower_bits(p: Limits, r: State, a: int, b: int) -> None:
+    """Registers that keep no more than the lower bits of what is worked out, of operands with a sign and without."""
+    s = r.inner
+    r.half = a * b - (r.count + 3) * -b
+    s.word = s.word * 3 + (r.other - a)
+    s.small = (a | b) + r.count
+    r.other = (s.word | 5) + (s.word ^ a) - (r.count & 0x7FFF)
+    if (s.word & 4 | s.word ^ 1) != 0 and r.count & p.form == 0:
+        s.word = -(s.word & 0xFF0)
+    r.memory[(r.count + a) & 7] = s.word & 3
+
+
+ACCEPTED = (arithmetic, conditions, floats, loops, effects, kept_calls, signs, lower_bits)
 
 
 def folded(p: Limits, r: State) -> None:

@@ -11,14 +11,18 @@ from detent.kernel.step import hot_step
 class ClockParams(Registers):
     """Taps of the divider, as masks of its counter."""
 
-    integrate_mask: i8 = register("periods of the oscillator per integration clock, less one", unit="count")
-    sample_mask: i8 = register("periods of the oscillator per speed sample, less one", unit="count")
+    integrate_mask: i8 = register(
+        "periods of the oscillator per integration clock, less one", unit="count", range=(0, (1 << 24) - 1)
+    )
+    sample_mask: i8 = register(
+        "periods of the oscillator per speed sample, less one", unit="count", range=(0, (1 << 24) - 1)
+    )
 
 
 class ClockChain(Registers):
     """Divider, toggle flip-flop and the two clocks of the present oscillator period."""
 
-    divider: i8 = register("oscillator periods since power-on", unit="count")
+    divider: i8 = register("oscillator periods since power-on", unit="count", range=(0, 1 << 62))
     toggle: u1 = register("toggle flip-flop 403: which of the two clocks is next")
     ck1: u1 = register("first reference clock, active in the high half of this oscillator period")
     ck2: u1 = register("second reference clock, active in the high half of this oscillator period")
@@ -36,7 +40,7 @@ def next_period(r: ClockChain) -> None:
 @hot_step
 def reference_period(r: ClockChain) -> int:
     """Number of the present period of the reference clocks, two of the oscillator; the first is 0."""
-    return (r.divider - 1) >> 1
+    return ((r.divider + 1) >> 1) - 1
 
 
 @hot_step
@@ -54,7 +58,7 @@ def sample_strobe(p: ClockParams, r: ClockChain) -> bool:
 class SawtoothParams(Registers):
     """Length of the sawtooth."""
 
-    half: i8 = register("half the counts of one PWM period, 2^(M-1)", unit="count")
+    half: i8 = register("half the counts of one PWM period, 2^(M-1)", unit="count", range=(1, 1 << 15))
 
 
 class SawtoothPwm(Registers):

@@ -24,9 +24,7 @@ NEVER = 1 << 62
 class ColumnTimerParams(Registers):
     """Geometry of the line and lead of the wires."""
 
-    column_zero: i4 = register(
-        "carriage position of column 0, 1/256 emitter", unit="emitter/256", range=(0, 0xFFFFFF)
-    )
+    column_zero: i4 = register("carriage position of column 0, 1/256 emitter", unit="emitter/256", range=(0, 0xFFFFFF))
     column_pitch: i4 = register("distance of two columns, 1/256 emitter", unit="emitter/256", range=(1, 0xFFFF))
     lead_per_speed: i4 = register(
         "flight lead per speed value, 1/65536 emitter", unit="emitter/65536", range=(0, 1 << 16)

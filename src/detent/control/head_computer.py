@@ -172,9 +172,7 @@ class HeadComputer(Registers):
     ramp_us: i4 = register("time per count of the ramp", unit="us")
     next_ramp_us: i8 = register("next count of the ramp", unit="us")
     next_trim_us: i8 = register("next trim", unit="us")
-    phase_start: i8 = register(
-        "position at which the present phase or window began", unit="emitter", range=(-FAR, FAR)
-    )
+    phase_start: i8 = register("position at which the present phase or window began", unit="emitter", range=(-FAR, FAR))
     start_emitters: i4 = register("emitters of the low-speed start", unit="emitter", range=(0, LARGEST_END))
 
     maximum: i2 = register("preselected maximum print speed value", unit="1/6 in/s", range=SPEEDS)

@@ -14,11 +14,11 @@ class LawParams(Registers):
     position_k1: i4 = register("KP1: of the shaped setpoint in position mode")
     position_k2: i4 = register("KP2: of the speed word in position mode")
     position_k3: i4 = register("KP3: of the sum in position mode")
-    dead_band: i4 = register("half width D of the dead band at stop", unit="count")
-    integral_limit: i4 = register("largest magnitude of the integral", unit="count")
+    dead_band: i4 = register("half width D of the dead band at stop", unit="count", range=(0, 0xFFFF))
+    integral_limit: i4 = register("largest magnitude of the integral", unit="count", range=(0, 0xFFFF))
     corrector: u1 = register("1: corrector in use", option=True)
     integrator: u1 = register("1: integrator in use", option=True)
-    word_limit: i8 = register("half the range of the drive word, 2^(M-1)", unit="count")
+    word_limit: i8 = register("half the range of the drive word, 2^(M-1)", unit="count", range=(1, 1 << 15))
 
 
 class Law(Registers):

@@ -16,14 +16,14 @@ NEVER = 1 << 62
 class SequencerParams(Registers):
     """Table, threshold and times."""
 
-    threshold: i8 = register("distance at which the mode changes", unit="count")
+    threshold: i8 = register("distance at which the mode changes", unit="count", range=(0, 0xFFFF))
     last: i8 = register("last entry of the table in use", unit="count", range=(0, TABLE - 1))
     table: i2_array = register(
         "reference velocity against distance [pulses per sample]", unit="count", length=TABLE, table=True
     )
     ready_ticks: i8 = register("one-shot 108: from position mode to ready", unit="tick")
     stop_ticks: i8 = register("one-shot 109: from position mode to stop", unit="tick")
-    quiet_ticks: i8 = register("silence of the tracker that ends the acquisition", unit="tick")
+    quiet_ticks: i8 = register("silence of the tracker that ends the acquisition", unit="tick", range=(0, 1 << 30))
     incremental: u1 = register(
         "1: final approach by counted pulses, the servo the method is compared with", option=True
     )

@@ -3,7 +3,6 @@
 from detent.kernel.registers import Registers, i4, register, u1
 from detent.kernel.step import step
 
-
 SLOPES = (0, 1023)
 """Slopes that an axis may have [count/256]."""
 

@@ -11,7 +11,7 @@ from detent.kernel.step import hot_step, step
 class PulseCounterParams(Registers):
     """Width of the counter."""
 
-    half: i8 = register("half the range of the counter, 2^(bits - 1)", unit="count")
+    half: i8 = register("half the range of the counter, 2^(bits - 1)", unit="count", range=(1, 1 << 15))
 
 
 class PulseCounter(Registers):

@@ -236,10 +236,10 @@ class Expressions(Integers):
             if value.truth is None:
                 parts.append(value)
             elif value.truth != both:  # it decides
-                parts = [*parts, value] if parts else []
-                if not parts:
+                if not any(self.is_impure(other) for other in node.values[:k]):
                     self.facts = before
                     return decided(not both)
+                parts.append(value)
                 break
         self.facts = before
         if self.is_impure(node):

@@ -14,6 +14,7 @@ from detent.translate.values import (
     HIGHEST,
     LOWEST,
     PRODUCT,
+    RANK,
     SUM,
     UNARY,
     UNSIGNED,
@@ -151,10 +152,14 @@ class Integers(Known):
         return replace(whole(f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}", ctype, lo, hi, ANY), of=of)
 
     def i_BitAnd(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802
-        """``a & b``."""
+        """``a & b``: of a mask without a sign no more than its own bits are needed of the other."""
         del node
         if b.lo >= 0 or a.lo >= 0:
-            return self._bitwise("&", a, b, 0, min(one.hi for one in (a, b) if one.lo >= 0))
+            hi = min(one.hi for one in (a, b) if one.lo >= 0)
+            bits = bits_of(hi)
+            if bits < 64 and not _type_without_sign(a, b) and any(RANK[one.ctype] > bits + 1 for one in (a, b)):
+                return self.masked(a, b, bits, hi)
+            return self._bitwise("&", a, b, 0, hi)
         return self._bitwise("&", a, b, LOWEST, HIGHEST)
 
     def i_BitOr(self, node: ast.BinOp, a: Value, b: Value) -> Value:  # noqa: N802
@@ -166,6 +171,11 @@ class Integers(Known):
         """``a ^ b``."""
         del node
         return self._bitwise("^", a, b, *_of_same_bits(a, b))
+
+    def masked(self, a: Value, b: Value, bits: int, hi: int) -> Value:
+        """What two numbers have in common, in so many bits without a sign."""
+        made = self.modular(replace(whole("", "int64_t", LOWEST, HIGHEST, ANY), of=("&", a, b)), bits)
+        return replace(made, lo=0, hi=hi)
 
     def negative(self, node: ast.AST, value: Value) -> Value:
         """``-value``."""

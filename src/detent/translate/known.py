@@ -145,14 +145,14 @@ class Known:
         Of a result whose lower bits are enough, or whose operands have no sign, the operands are converted instead.
         """
         bits, before = 32 if ctype == "uint32_t" else 16, value.ctype
-        if value.is_composite and value.of is not None and (ctype in UNSIGNED) != (before in UNSIGNED):
-            if before in UNSIGNED:
+        if value.of is not None and (ctype in UNSIGNED) != (before in UNSIGNED):
+            if before in UNSIGNED and value.is_composite:
                 sign, *operands = value.of
                 ends = [end for one in operands for end in (one.lo, one.hi)]
                 made, (a, b) = self.brought_to(bits_of(*ends), *operands)
                 text = f"{in_brackets(a, UNARY)} {sign} {in_brackets(b, UNARY)}"
                 value = replace(value, text=text, ctype=made, of=None)
-            elif RANK[before] >= bits:
+            elif before not in UNSIGNED and RANK[before] >= bits:
                 value = self.modular(value, bits)
             if value.ctype == ctype:
                 return value

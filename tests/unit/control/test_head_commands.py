@@ -21,6 +21,7 @@ from detent.control.head_computer import (
     CALCULATE,
     CONTROLLED_RUN,
     ILLEGAL,
+    LARGEST_END,
     NO_OPERATION,
     OK,
     OUT_OF_RANGE,
@@ -150,10 +151,19 @@ def test_a_full_queue_refuses_in_order_and_loses_no_answer(c):
 
 
 def test_a_flood_that_was_refused_is_answered_as_far_as_the_port_holds_it(c):
-    c.operation, c.end = REFUSED, (1 << 31) - 1
+    c.operation, c.end = REFUSED, LARGEST_END
     answer(c, OVERRUN)
     assert (c.status.waiting, c.status.latch.byte) == (ROOM - 1, OVERRUN)
     assert c.status.lost == (1 + c.end - ROOM) & 0xFF
+
+
+def test_a_flood_is_counted_as_far_as_an_argument_goes(c):
+    for _ in range(QUEUE):
+        enqueue(c, REFUSED, OVERRUN, 0)
+    c.queue.end[QUEUE - 1] = LARGEST_END - 1
+    for wanted in (LARGEST_END, LARGEST_END):
+        enqueue(c, REFUSED, OVERRUN, 0)
+        assert c.queue.end[QUEUE - 1] == wanted
 
 
 @pytest.mark.parametrize(("s", "code"), [(0, 2), (17, 2), (18, 0), (100, 0), (240, 0), (241, 2), (255, 2)])

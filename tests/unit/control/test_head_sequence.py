@@ -5,6 +5,7 @@ from tests.print_head_rig import EMITTER, Rig
 
 from detent.control.head_computer import (
     CALCULATE,
+    FAR,
     FAULT,
     HIGH_ACCEL,
     HIGH_REVERSE,
@@ -23,6 +24,7 @@ from detent.control.head_computer import (
     POWER_ON,
     RUN,
     STALL_US,
+    WINDOWS,
 )
 from detent.control.head_sequence import (
     REVERSAL_US,
@@ -35,6 +37,7 @@ from detent.control.head_sequence import (
     switch_off,
     window_timer,
 )
+from detent.control.self_identification import LONGEST
 from detent.plant.drive_train import fill_period
 
 MOVING = (LOW_START, LOW_STEADY, LOW_STOP, HIGH_ACCEL, HIGH_STEADY, HIGH_TRANSITION, HIGH_REVERSE)
@@ -367,6 +370,29 @@ def test_fast_windows_keep_the_last_and_slow_ones_add_up():
             c.now_us += 1
             window_timer(c)
         assert (c.window_total, c.windows) == (total, windows)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_emitters_are_counted_as_far_as_their_register_claims(side):
+    rig = Rig().pretend_identified()
+    p, c = rig.p.controller, rig.head
+    c.state, c.emitter = IDLE, side * (FAR - 1)
+    for wanted in (FAR, FAR, FAR):
+        on_emitter(p, c, c.last_emitter_us + 100, side)
+        assert c.emitter == side * wanted
+    on_emitter(p, c, c.last_emitter_us + 100, -side)
+    assert c.emitter == side * (FAR - 1)
+
+
+def test_windows_are_counted_as_far_as_their_registers_claim():
+    rig = Rig().pretend_identified()
+    c = rig.head
+    c.calibration_pass, c.direction, c.windows, c.window_total = 3, 1, WINDOWS - 1, LONGEST - 3
+    c.phase_start, c.emitter, c.window_us, c.now_us = 0, 2, 0, 1
+    for wanted in ((WINDOWS, LONGEST - 1), (WINDOWS, LONGEST)):
+        window_timer(c)
+        assert (c.windows, c.window_total) == wanted
+        c.emitter, c.window_us = c.emitter + 2, 0
 
 
 def test_the_computer_wakes_for_its_earliest_timer():

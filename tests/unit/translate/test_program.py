@@ -106,6 +106,15 @@ def test_an_operators_result_is_made_wider_or_unsigned_by_a_function():
     assert "r->other = (int64_t)t_shift_down_int((int)p->form, p->shift);" in text
 
 
+def test_of_a_result_no_more_is_made_than_what_is_kept():
+    text = text_of(firmware_steps.lower_bits)
+    assert "r->half = t_wrap_i2(" in text
+    assert "s->word = (uint16_t)((s->word * 3U) + ((unsigned)r->other - (unsigned)a));" in text
+    assert "if ((((s->word & 4U) | (s->word ^ 1U)) != 0U) && (" in text  # words without a sign stay such
+    assert "int64_t t_wrap_mul" not in text  # nor is a function left of what is made in another way
+    assert "& 7U" in text
+
+
 def test_a_chain_of_else_if_ends_with_an_else():
     text = text_of(firmware_steps.signs)
     assert text.count("    } else {\n        /* nothing */\n    }\n") == 1
