@@ -30,7 +30,7 @@ from detent.control.step_rule import come_to_rest, follow, next_step, take_input
 from detent.errors import InputError
 from detent.export.code import FLAGS, PROCESSORS, WARNINGS, template
 from detent.export.linked import fill_addresses
-from detent.export.measure import Measured, measure
+from detent.export.measure import Measured, measure, report_lines
 from detent.export.selftest import CALLS
 from detent.export.show import shown
 from detent.export.teeth import mutants, reach, sites
@@ -191,6 +191,37 @@ def test_08_whole_numbers_are_equal_where_an_int_has_16_bits(exported, method):
     assert (len(first) < 0.9 * len(data), told != manifest["hash"]) == (True, True)
     assert cut(unit_named(manifest["method"], manifest["name"]), data, 6_000) == (data, 6_000, manifest["hash"])
     proven(folder, "avr")
+
+
+@pytest.mark.parametrize("method", ON_AVR)
+def test_10_what_a_unit_takes_of_an_avr_stands_in_the_report(exported, method):
+    """Section 10; cycles, since its emulator knows those of each instruction."""
+    needs("avr")
+    folder = exported(method, 6_000)
+    name = read_manifest(folder)["name"]
+    (found,) = measure(folder, ["avr"], 16e6)
+    assert (found.target, found.counts, found.missed) == ("avr", "cycles", "")
+    sizes, entries = found.sizes["-Os"], {one.name: one for one in found.entries}
+    unit, _ = exported_unit(folder, read_manifest(folder))
+    image = sum(leaf.width.size * max(leaf.length, 1) for leaf in unit.leaves)
+    assert sizes.memory == image  # an AVR leaves no gaps
+    assert 1_000 < sizes.flash < found.sizes["-O2"].flash < 16_384
+    assert (sizes.tables > 500, sizes.written) == (True, 0)
+    assert "__muldi3" in sizes.library
+    control, tested = entries[f"{name}_control"], entries[f"{name}_selftest"]
+    assert control.calls <= 6_000
+    assert 100 < control.mean < control.most < 5_000
+    assert 100_000 < tested.most < 250_000
+    assert all(0 < one.painted <= one.stack < 512 for one in entries.values())
+    assert found.share["most"] == pytest.approx(control.most / (16e6 * read_manifest(folder)["tick"]))
+    lines = list(report_lines(folder, [found], "16MHz"))
+    assert "  cycles of a call, over the vectors of the job; stack computed / painted" in lines
+    assert not any("cycles an instruction assumed" in line for line in lines)
+
+
+def test_10_a_unit_with_floats_is_not_measured_on_an_avr(exported):
+    (one,) = measure(exported("cascade"), ["avr"])
+    assert (one.missed[:5], one.entries) == ("FW05:", ())
 
 
 def test_09_floats_are_refused_for_a_processor_whose_double_is_narrow(exported, tmp_path):
