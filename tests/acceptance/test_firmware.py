@@ -15,12 +15,14 @@ import sys
 import threading
 from dataclasses import replace
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
 from tests import firmware_steps
 from tests.bare_units import bare_code
 from tests.docs.pages import blocks_of
+from tests.firmware_replay import replayed
 from tests.firmware_steps import REFUSED
 
 import detent
@@ -34,8 +36,8 @@ from detent.export.measure import Measured, measure, report_lines
 from detent.export.selftest import CALLS
 from detent.export.show import shown
 from detent.export.teeth import mutants, reach, sites
-from detent.export.unit import unit_named
-from detent.export.vectors import cut
+from detent.export.unit import unit_named, unit_of
+from detent.export.vectors import cut, record
 from detent.export.verify import TARGETS, Target, exported_unit, left_out, verify
 from detent.export.write import export_firmware, read_manifest
 from detent.kernel.registers import Fit
@@ -233,6 +235,52 @@ def test_09_floats_are_refused_for_a_processor_whose_double_is_narrow(exported, 
     (refused,) = verify(exported("cascade"), ["avr"])
     assert (refused.equal, refused.told[:5]) == (False, "FW05:")
     assert "avr" in left_out(exported("cascade"))
+
+
+def recorded(method: str, ticks: int):
+    """The packaged job of a method, with its control unit as a witness: its vectors, and the axis at the end."""
+    axis = detent.load(detent.example(f"{method}.toml"))
+    job = axis.load_job(detent.example(JOBS[method]))
+    golden = record(unit_of(axis, motor=MOTORS.get(method, "")), axis, job, ticks)
+    return golden, golden.vectors()
+
+
+def alone_is_equal(method: str, ticks: int) -> None:
+    """In all registers that the control unit and the whole axis both have, after every tick."""
+    golden, data = recorded(method, ticks)
+    checks = list(replayed(golden.unit, golden.params, data))
+    assert [wrong for _, wrong in checks if wrong] == []
+    one, _ = checks[-1]
+    assert one.ticks == golden.ticks
+    assert len(checks) == -(-one.ticks // 1000)
+    whole = {"c": bytes(golden.state.controller), "l": bytes(golden.state.lines)}
+    for leaf in golden.unit.leaves:
+        size = leaf.width.size * max(leaf.length, 1)
+        assert one.bytes_of(leaf) == whole[leaf.path[0]][leaf.offset : leaf.offset + size], leaf.path
+
+
+@pytest.mark.parametrize("method", JOBS)
+def test_12_a_control_unit_alone_has_the_registers_of_the_whole_axis_in_its_packaged_job(method):
+    """Without motor, mechanics and host: told what came along the lines, and what the host did."""
+    alone_is_equal(method, SHORT)
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("method", JOBS)
+def test_12_a_control_unit_alone_has_the_registers_of_the_whole_axis_for_long(method):
+    alone_is_equal(method, LONG)
+
+
+@pytest.mark.parametrize("method", ["cascade", "phase_servo"])
+def test_12_a_unit_that_is_told_something_else_is_another(method):
+    golden, data = recorded(method, SHORT)
+    path = {"cascade": "law.cascade.position_gain", "phase_servo": "pwm.half"}[method]
+    block, _, last = path.rpartition(".")
+    registers = attrgetter(block)(golden.params)
+    setattr(registers, last, getattr(registers, last) + 1)
+    first, *_ = [wrong for _, wrong in replayed(golden.unit, golden.params, data) if wrong]
+    assert first[0].startswith("hash from tick ")
+    assert len(first) > 1
 
 
 def test_12_ranges_hold_in_every_standard_job():
