@@ -210,7 +210,7 @@ def test_10_what_a_unit_takes_of_an_avr_stands_in_the_report(exported, method):
     assert 1_000 < sizes.flash < found.sizes["-O2"].flash < 16_384
     assert (sizes.tables > 500, sizes.written) == (True, 0)
     assert "__muldi3" in sizes.library
-    control, tested = entries[f"{name}_control"], entries[f"{name}_selftest"]
+    control, tested = entries[f"{name}_control"], entries[f"{name}_selftest_on"]
     assert control.calls <= 6_000
     assert 100 < control.mean < control.most < 5_000
     assert 100_000 < tested.most < 250_000
@@ -698,7 +698,7 @@ def test_35_the_self_test_of_64_calls_takes_2_ms_at_48_mhz_at_most(counted, tmp_
     name, (measured, _) = read_manifest(folder)["name"], (found["cortex-m0"], found["cortex-m4"])
     text = (folder / f"{name}_selftest.c").read_text()
     assert len(re.findall(rf"^    \(void\){name}_\w+\(.*\);$", text, re.MULTILINE)) == CALLS == 64
-    (tested,) = (one for one in measured.entries if one.name == f"{name}_selftest")
+    (tested,) = (one for one in measured.entries if one.name == f"{name}_selftest_on")
     assert (measured.missed, tested.calls) == ("", 1)
     assert 10_000 < tested.most <= 96_000
     assert tested.painted <= tested.stack
@@ -1123,6 +1123,7 @@ def test_31_a_change_that_does_not_fit_is_refused_with_its_line(tmp_path, name, 
 
 @pytest.mark.long
 def test_29_export_and_verify_take_no_more_processor_time_than_stated(tmp_path):
+    """One after the other, none of it in parallel: on a machine that does nothing else this is the time on the wall."""
     def taken(command: str) -> float:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         done = run(f"{sys.executable} -m detent {command}", tmp_path)
@@ -1131,14 +1132,12 @@ def test_29_export_and_verify_take_no_more_processor_time_than_stated(tmp_path):
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
     needs("host-gcc")
-    export = (
-        f"export firmware {detent.example('print_head.toml')} --job {detent.example('letter.txt')} --output out "
-        "--ticks 10000000 --files 20 --rounds 2000"
-    )
+    job = f"{detent.example('print_head.toml')} --job {detent.example('letter.txt')}"
+    export = f"export firmware {job} --output out"
     taken(export)  # compiled steps to the cache
-    assert taken(export) <= 15.0 * 2  # wall time of the specification, on two cores
-    assert taken("verify out --on host-gcc") <= 60.0 * 2
-    assert taken("verify out") <= 600.0 * 2
+    assert taken(export) <= 15.0
+    assert taken("verify out --on host-gcc") <= 60.0
+    assert taken("verify out") <= 600.0
 
 
 # ---- in the documentation

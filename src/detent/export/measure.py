@@ -107,7 +107,7 @@ def measure(
 def _measured(folder: Path, manifest: Mapping[str, Any], target: Target, clock: float) -> Measured:
     """Compile with the counter, and replay the job."""
     name, source, tools = manifest["name"], folder.resolve(), (target.linker or target.compiler).removesuffix("gcc")
-    entries, tables = [*manifest["entries"], f"{name}_selftest"], tables_of(folder)
+    entries, tables = [*manifest["entries"], f"{name}_selftest_on"], tables_of(folder)
     with tempfile.TemporaryDirectory() as made:
         work, sizes = Path(made), dict[str, Sizes]()
         (work / "count.h").write_text(template("count.h.in", NAME=name.upper()), encoding="ascii")
