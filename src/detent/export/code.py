@@ -291,7 +291,7 @@ def texts(  # noqa: PLR0913 - what the files tell of
 def _selftest_text(unit: ControlUnit, params: Registers, given: Mapping[str, Any]) -> str:
     """The calls of the self-test, with the hash that the compiled steps make of them."""
     found = self_test(unit, params)
-    roots = {"params": f"&{unit.name}_defaults", "controller": "&c", "lines": "&l"}
+    roots = {"params": f"&{unit.name}_defaults", "controller": "c", "lines": "l"}
     calls = list[dict[str, Any]]()
     for one in found.calls:
         step = unit.entries[one.name]
@@ -299,7 +299,7 @@ def _selftest_text(unit: ControlUnit, params: Registers, given: Mapping[str, Any
         codes = arguments(step, {unit.params: "params", unit.controller: "controller", unit.lines: "lines"})
         texts = [roots.get(code) or (next(signals) if code == "signal" else number(next(numbers)).text)
                  for code in codes]  # fmt: skip
-        shown = [(place_of(leaf.path, "c.", "l."), number(value).text) for leaf, value in one.shown]
+        shown = [(place_of(leaf.path, "c->", "l->"), number(value).text) for leaf, value in one.shown]
         calls.append({"name": one.name, "texts": texts, "shown": shown})
     sizes = {root: sum(leaf.width.size * max(leaf.length, 1) for leaf in unit.leaves if leaf.path[0] == root)
              for root in "cl"}  # fmt: skip

@@ -1,7 +1,7 @@
 """What a unit takes on a processor: flash, memory, stack, instructions of each entry; and what is not proven of it.
 
 The instructions are counted by an emulator whose clock goes on with each of them (qemu ``-icount``), over the vectors
-of the job. They are instructions, not cycles.
+of the job. They are instructions, not cycles; of an AVR, whose emulator knows the cycles of each, they are cycles.
 """
 
 import csv
@@ -16,13 +16,13 @@ from typing import Any
 from detent.errors import DetentError
 from detent.export.code import FLAGS, as_json, template
 from detent.export.sizes import Sizes, sizes_of
-from detent.export.verify import TARGETS, Target, answer, compile_parts, link, run_tool
+from detent.export.verify import TARGETS, Target, absent, answer, compile_parts, job_for, left_out, link, run_tool
 from detent.export.write import MANIFEST, manifest_of
 from detent.files.text import write_errors
 
 SHIFT = 10  # an instruction takes 2^10 ns of the emulator's clock
-COUNTS = {"cortex": 40 / (1 << SHIFT + 8), "rv32": 1 / (1 << SHIFT)}
-"""Instructions in a count: SysTick counts 40 ns in its upper 24 bits, the counter of RISC-V 1 ns."""
+COUNTS = {"cortex": 40 / (1 << SHIFT + 8), "rv32": 1 / (1 << SHIFT), "avr": 1 / (1 << 10)}
+"""Instructions in a count: SysTick counts 40 ns in its upper 24 bits, the counter of RISC-V 1 ns; cycles of an AVR."""
 LEVELS = ("-Os", "-O2")
 CYCLES = 1.5  # of an instruction, as assumed for the share of a tick
 
@@ -51,11 +51,12 @@ class Measured:
     share: Mapping[str, float] = field(default_factory=dict[str, float])
     """Part of a tick that `control` takes, mean and most, at the clock that was asked for."""
     missed: str = ""  # why there is nothing
+    counts: str = "instructions"  # what the entries count
 
 
 def measurable() -> list[str]:
     """Names of the processors on which instructions and stack can be counted here."""
-    return [one.name for one in TARGETS.values() if one.memory is not None and not one.missing]
+    return [one.name for one in TARGETS.values() if one.is_emulated and not one.missing]
 
 
 def measure(
@@ -89,13 +90,15 @@ def measure(
     """
     place = Path(folder)
     manifest = manifest_of(place)
-    chosen = [name for name in on or measurable() if name in TARGETS and TARGETS[name].memory is not None]
+    out = left_out(place)
+    told = [name for name in measurable() if not out.get(name, "").startswith("FW")]
+    chosen = [name for name in on or told if name in TARGETS and TARGETS[name].is_emulated]
     found: list[Measured] = []
     for k, name in enumerate(chosen):
         progress(k / len(chosen), f"counting instructions on {name}")
         target = TARGETS[name]
-        if target.missing:
-            found.append(Measured(name, missed=f"not installed: {target.missing}"))
+        if name in out:
+            found.append(Measured(name, missed=absent(out[name])))
         else:
             found.append(_measured(place, manifest, target, clock))
     return found
@@ -104,24 +107,27 @@ def measure(
 def _measured(folder: Path, manifest: Mapping[str, Any], target: Target, clock: float) -> Measured:
     """Compile with the counter, and replay the job."""
     name, source, tools = manifest["name"], folder.resolve(), (target.linker or target.compiler).removesuffix("gcc")
-    entries, tables = [*manifest["entries"], f"{name}_selftest"], tables_of(folder)
+    entries, tables = [*manifest["entries"], f"{name}_selftest_on"], tables_of(folder)
     with tempfile.TemporaryDirectory() as made:
         work, sizes = Path(made), dict[str, Sizes]()
         (work / "count.h").write_text(template("count.h.in", NAME=name.upper()), encoding="ascii")
+        job_file, ticks, wanted = job_for(folder, manifest, target, work)
         told = ""
         for level in reversed(LEVELS):  # what is compiled last is run
             unit = f"{target.compiler} {FLAGS} {level} {target.flags} -I{source} -c {source}/{name}.c -o unit.o"
             told = told or run_tool(unit.split(), work)
-            told = told or compile_parts(source, name, target, level, work, "-include count.h")
+            told = told or compile_parts(source, name, target, level, work, "-include count.h", job_file)
             told = told or link(work, target, level, "job", ("unit", "replay", "selftest", "board_job"))
             if told:
                 return Measured(target.name, missed=f"does not compile: {told}")
-            sizes[level] = sizes_of(tools, work, entries, "job", tables)
+            sizes[level] = sizes_of(tools, work, entries, "job", tables, target.back)
         lines = answer(target, work, source, "job", f"-icount shift={SHIFT}").splitlines()
-    if f"equal {manifest['ticks']} {manifest['hash']}" not in lines:
+    if f"equal {ticks} {wanted}" not in lines:
         return Measured(target.name, sizes, missed=" ".join(lines[-3:]) or "no answer")
     counted = list(_entries(target, lines, manifest, sizes[LEVELS[0]]))
-    return Measured(target.name, sizes, tuple(counted), _share(counted, manifest, clock))
+    is_avr = target.name == "avr"
+    share = _share(counted, manifest, clock, 1.0 if is_avr else CYCLES)
+    return Measured(target.name, sizes, tuple(counted), share, counts="cycles" if is_avr else "instructions")
 
 
 def tables_of(folder: Path) -> int:
@@ -146,11 +152,13 @@ def _entries(target: Target, lines: Sequence[str], manifest: Mapping[str, Any], 
             )  # fmt: skip
 
 
-def _share(entries: Sequence[Entry], manifest: Mapping[str, Any], clock: float) -> dict[str, float]:
+def _share(
+    entries: Sequence[Entry], manifest: Mapping[str, Any], clock: float, cycles: float = CYCLES
+) -> dict[str, float]:
     control = next((one for one in entries if one.name.endswith("_control")), None)
     if control is None or clock <= 0.0:
         return {}
-    of_tick = CYCLES / (clock * float(manifest["tick"]))
+    of_tick = cycles / (clock * float(manifest["tick"]))
     return {"mean": control.mean * of_tick, "most": control.most * of_tick}
 
 
@@ -204,7 +212,8 @@ def report_lines(folder: str | Path, measured: Sequence[Measured], clock: str = 
             routines = ", ".join(f"{name} {size}" for name, size in s.library.items())
             yield f"  library: {routines or 'none'}"
         if one.entries:
-            yield "  instructions (not cycles) of a call, over the vectors of the job; stack computed / painted"
+            what = "cycles" if one.counts == "cycles" else "instructions (not cycles)"
+            yield f"  {what} of a call, over the vectors of the job; stack computed / painted"
         for e in one.entries:
             yield (
                 f"    {e.name}: {e.calls} calls, mean {e.mean:g}, most {e.most} in tick {e.tick}; "
@@ -212,7 +221,8 @@ def report_lines(folder: str | Path, measured: Sequence[Measured], clock: str = 
             )
         if one.share:
             mean, most = (f"{100.0 * one.share[key]:.3g} %" for key in ("mean", "most"))
-            yield f"  of a tick at {clock}: mean {mean}, most {most}, with {CYCLES} cycles an instruction assumed"
+            assumed = "" if one.counts == "cycles" else f", with {CYCLES} cycles an instruction assumed"
+            yield f"  of a tick at {clock}: mean {mean}, most {most}{assumed}"
     loops = sorted({loop for one in manifest["entries"].values() for loop in one["loops"]})
     yield f"loops: {len(loops) or 'none'}"
     yield from (f"  {loop}" for loop in loops)

@@ -20,7 +20,7 @@ LOADED = (
     ("lui", re.compile(r"^(\w+),0x([0-9a-f]+)")),  # RISC-V: the upper 20 bits
 )
 BY_REGISTER = re.compile(r"^sp,(?: ?sp,)? ?([a-z]\w+)$")
-OF_AVR = re.compile(r"^r(28|29), 0x([0-9A-Fa-f]+)")
+OF_AVR = re.compile(r"^(r\d+), (0x[0-9A-Fa-f]+|r1)")
 FILLING = ("nop", "unimp")
 LEAVES = ("b", "b.n", "b.w", "bx", "j", "jr", "jmp", "rjmp", "ret", "reti", "mret", "udf", "tail")
 
@@ -62,7 +62,7 @@ class _Frame:
     def __init__(self, literals: Mapping[int, int], back: int) -> None:
         self._literals, self._back = literals, back
         self._held: dict[str, int] = {}  # numbers that registers hold
-        self._lower = 0  # low byte of what an AVR is about to take off its frame pointer
+        self._laid = self._area = 0  # arguments on the stack of an AVR: now, and at most
 
     def taken(self, word: str, rest: str) -> int:
         """Bytes by which an instruction lowers the stack pointer."""
@@ -81,23 +81,40 @@ class _Frame:
         return _taken(word, rest)
 
     def _taken_by_avr(self, word: str, rest: str) -> int:
-        """Of an AVR, whose frame pointer is r28 and r29: what is pushed, and what a copy of the pointer loses."""
+        """Of an AVR: what is pushed, and what a copy of the pointer loses; in r28 and r29 that is the frame."""
         if word == "push":
             return 1
         if word == "rcall" and rest.startswith(".+0"):
             return self._back
         told = OF_AVR.match(rest)
-        if word == "in" and told:
-            self._held["r28"] = 1
-        elif told and "r28" in self._held and word == "sbiw":
-            return int(told[2], 16)
-        elif told and "r28" in self._held and word in ("subi", "sbci"):
-            number = int(told[2], 16)
-            if told[1] == "28":
-                self._lower = number
-            else:
-                return number << 8 | self._lower if number < 128 else 0
+        if word == "in" and told and told[2].lower() == "0x3d":
+            self._held = {told[1]: 0}  # a copy of the stack pointer: what it has lost so far
+        elif word == "out":
+            return self._put_back(rest)
+        elif told and told[1] in self._held and word in ("subi", "sbiw", "adiw"):
+            self._held[told[1]] = int(told[2], 16) * (-1 if word == "adiw" else 1)
+        elif told and word == "sbci":
+            low = f"r{int(told[1][1:]) - 1}"
+            if low in self._held:
+                lost = int(told[2], 16) << 8 | self._held[low]
+                self._held[low] = lost - (1 << 16) if lost >> 15 else lost
         return 0
+
+    def _put_back(self, rest: str) -> int:
+        """A copy of an AVR's stack pointer becomes the pointer again: the frame, or arguments that get no register.
+
+        Those of several calls are taken away together; they count as many as are there at once.
+        """
+        told = re.match(r"0x3d, (r\d+)", rest, re.IGNORECASE)
+        low = told[1] if told else ""
+        if low not in self._held:
+            return 0
+        lost = self._held.pop(low)
+        if low == "r28":
+            return max(0, lost)
+        self._laid = max(0, self._laid + lost)
+        more, self._area = max(0, self._laid - self._area), max(self._area, self._laid)
+        return more
 
 
 def routines(listing: str, back: int = 0) -> dict[str, Routine]:

@@ -67,7 +67,7 @@ class Golden:
         self._set = b""  # the parameters as they are
         self._feed: tuple[bytes, ...] = ()
         self._actions = list(unit.entries.items())[1:]
-        self._state: Any = None
+        self.state: Any = None  # of the axis, as it is
 
     def _meet(self, params: Any) -> None:
         """The axis is there: its arrays are as long as its parameters use them."""
@@ -162,7 +162,7 @@ class Golden:
 
     def _look(self, state: Any) -> None:
         """Note what stands on the wires of the plant; refuse what a host has written without an action."""
-        self._state = state
+        self.state = state
         now = self._memory()
         for k in self._inside:
             at = slice(self._offsets[k], self._offsets[k] + _size(self._leaves[k]))
@@ -179,7 +179,7 @@ class Golden:
         """Note the ticks of a stretch: what came along the lines, and the hash after each."""
         if ticks:
             begin, state = self._known, self._memory()
-            rows = self.rows[np.arange(self._state.tick - ticks + 1, self._state.tick + 1) % STRETCH]
+            rows = self.rows[np.arange(self.state.tick - ticks + 1, self.state.tick + 1) % STRETCH]
             low = np.zeros(ticks, np.uint8)
             add_rows(self.hash, rows, low)
             self._note_ticks(rows, low, begin)
@@ -210,7 +210,7 @@ class Golden:
     # ---- records
 
     def _memory(self) -> bytes:
-        return bytes(self._state.controller) + bytes(self._state.lines)
+        return bytes(self.state.controller) + bytes(self.state.lines)
 
     def _write(self, k: int, old: bytes, new: bytes) -> None:
         if old == new:

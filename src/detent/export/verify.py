@@ -50,8 +50,14 @@ class Target:
     libraries: str = "-lm"
     share: int = 1  # of the random calls and ticks one in so many is done; 0: none, it has no room for them
     most: int = 0  # ticks of the job; 0: all
+    back: int = 0  # what a call leaves on the stack [byte]; 0 where it does not, but in a register
     warnings: str = WARNINGS
     linker: str = ""  # where it is not the compiler
+
+    @property
+    def is_emulated(self) -> bool:
+        """True for a processor on which instructions or cycles, and stack, can be counted."""
+        return self.memory is not None or bool(self.emulator)
 
     @property
     def missing(self) -> str:
@@ -93,7 +99,7 @@ TARGETS = {
         # simavr, since qemu 7.2 reads flash beyond 64 KB as if it began anew; gcc 5.4 knows one warning less.
         Target(
             "avr", "avr-gcc", "gcc-avr avr-libc", PROCESSORS["avr"], emulator="simavr",
-            machine="-m atmega2560 -f 16000000", emulator_package="simavr", libraries="", share=0, most=6000,
+            machine="-m atmega2560 -f 16000000", emulator_package="simavr", libraries="", share=0, most=6000, back=3,
             warnings=WARNINGS.replace("-Wimplicit-fallthrough", ""),
         ),
     )
@@ -147,13 +153,13 @@ def verify(
     for k, (target, level) in enumerate(runs):
         progress(k / len(runs), f"{target.name} {level.split()[0]}")
         if target.name in out:
-            found.append(Proof(target.name, level, equal=False, told=_absent(out[target.name])))
+            found.append(Proof(target.name, level, equal=False, told=absent(out[target.name])))
         else:
             found.append(_replayed(place, manifest, target, level))
     return found
 
 
-def _absent(why: str) -> str:
+def absent(why: str) -> str:
     """What a proof says that could not be tried: a refusal as it is, or the tools that are missing."""
     return why if why.startswith("FW") else f"not installed: {why}"
 
@@ -175,14 +181,10 @@ def left_out(folder: str | Path) -> dict[str, str]:
 
 def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str) -> Proof:
     """Compile for a target, and run there."""
-    name, source, job_file = manifest["name"], folder.resolve(), folder.resolve() / "vectors/job.vec"
-    ticks, wanted = manifest["ticks"], manifest["hash"]
+    name, source = manifest["name"], folder.resolve()
     with tempfile.TemporaryDirectory() as made:
-        work, known = Path(made), exported_unit(folder, manifest) if target.most else None
-        if known is not None:
-            data, ticks, wanted = cut(known[0], job_file.read_bytes(), target.most)
-            job_file = work / "job.vec"
-            job_file.write_bytes(data)
+        work = Path(made)
+        job_file, ticks, wanted = job_for(folder, manifest, target, work)
         strict = f"{target.compiler} {FLAGS} {level} {target.flags} {target.warnings} -Werror -I{source} -c"
         told = run_tool([*strict.split(), str(source / f"{name}.c"), "-o", "unit.o"], work)
         told = told or compile_parts(source, name, target, level, work, job=job_file)
@@ -197,6 +199,17 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
     told = [told_of_drawn(folder, manifest, drawn)] if not any(one.startswith("drawn equal ") for one in drawn) else []
     told += [told_of(folder, job)] if f"equal {ticks} {wanted}" not in job else []
     return Proof(target.name, level, not told, "; job ".join(told) or wanted)
+
+
+def job_for(folder: Path, manifest: Mapping[str, Any], target: Target, work: Path) -> tuple[Path, int, str]:
+    """Vectors of the job as far as a target has room for them: the file, its ticks, and the hash behind them."""
+    file = folder.resolve() / "vectors/job.vec"
+    known = exported_unit(folder, manifest) if target.most else None
+    if known is None:
+        return file, int(manifest["ticks"]), str(manifest["hash"])
+    data, ticks, wanted = cut(known[0], file.read_bytes(), target.most)
+    (work / "job.vec").write_bytes(data)
+    return work / "job.vec", ticks, wanted
 
 
 def compile_parts(  # noqa: PLR0913 - what, for which processor, and where

@@ -249,8 +249,8 @@ def readme(manifest: Mapping[str, Any], unit: ControlUnit, tick: str) -> str:
 Written by detent {manifest["detent"]} from an axis of the method {manifest["method"]}. C99, no heap, no globals.
 
 1. Compile the sources of `build.mk` with its flags, `{manifest["flags"]}` among them. Never `-ffast-math`.
-2. At power-on: check `{name}_selftest() == 0`, which makes 64 calls with the flags of this very build, and
-   `{name}_check_params(&{name}_defaults) == 0`, set a
+2. At power-on: check `{name}_selftest() == 0`, which makes 64 calls with the flags of this very build (where memory is
+   short, `{name}_selftest_on` uses registers that you have), and `{name}_check_params(&{name}_defaults) == 0`, set a
    `{name}_controller` and a `{name}_lines` to zero bytes, write what the sensors show into the lines, and call
    `{unit.begins}`.
 3. Every {tick}: write the lines that the plant writes, call `{name}_control`, and put the others out. Calls with the

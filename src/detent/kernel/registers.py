@@ -7,11 +7,11 @@ one declaration, and numpy takes the class for a dtype.
 """
 
 import ctypes
+import dataclasses
 import inspect
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Self, get_args
 
 if TYPE_CHECKING:
@@ -95,9 +95,11 @@ class Leaf:
 class Fit:
     """How much of their arrays some registers use, and what those that reach into them hold then; by class and name."""
 
-    lengths: "Mapping[tuple[type[Registers], str], int]" = MappingProxyType({})
-    ranges: "Mapping[tuple[type[Registers], str], tuple[float, float]]" = MappingProxyType({})
-    values: "Mapping[tuple[type[Registers], str], int]" = MappingProxyType({})
+    lengths: "Mapping[tuple[type[Registers], str], int]" = dataclasses.field(default_factory=dict[Any, Any])
+    ranges: "Mapping[tuple[type[Registers], str], tuple[float, float]]" = dataclasses.field(
+        default_factory=dict[Any, Any]
+    )
+    values: "Mapping[tuple[type[Registers], str], int]" = dataclasses.field(default_factory=dict[Any, Any])
     """Parameters that say how much it is."""
 
 

@@ -72,6 +72,7 @@ AVR = """
      106:	cd b7       	in	r28, 0x3d	; 61
      108:	de b7       	in	r29, 0x3e	; 62
      10a:	2a 97       	sbiw	r28, 0x0a	; 10
+     10b:	cd bf       	out	0x3d, r28	; 61
      10c:	0e 94 a0 00 	call	0x140	; 0x140 <a_inner>
      110:	2a 96       	adiw	r28, 0x0a	; 10
      112:	08 95       	ret
@@ -80,13 +81,35 @@ AVR = """
      140:	cd b7       	in	r28, 0x3d	; 61
      142:	cc 52       	subi	r28, 0x2C	; 44
      144:	d1 40       	sbci	r29, 0x01	; 1
+     145:	cd bf       	out	0x3d, r28
      146:	c4 5d       	subi	r28, 0xD4	; 212
      148:	de 4f       	sbci	r29, 0xFE	; 254
      14a:	08 95       	ret
 
-00000150 <a_leaf>:
-     150:	21 97       	sbiw	r28, 0x01	; 1
-     152:	08 95       	ret
+00000148 <a_middle>:
+     148:	cd b7       	in	r28, 0x3d	; 61
+     149:	c6 5f       	subi	r28, 0xF6	; 246
+     14a:	d1 09       	sbc	r29, r1
+     14b:	cd bf       	out	0x3d, r28
+     14c:	8d b7       	in	r24, 0x3d	; 61
+     14d:	08 97       	sbiw	r24, 0x08	; 8
+     14e:	8d bf       	out	0x3d, r24
+     14f:	ad b7       	in	r26, 0x3d	; 61
+     150:	11 96       	adiw	r26, 0x01	; 1
+     151:	8d b7       	in	r24, 0x3d	; 61
+     152:	08 97       	sbiw	r24, 0x08	; 8
+     153:	8d bf       	out	0x3d, r24
+     154:	8d b7       	in	r24, 0x3d	; 61
+     155:	40 96       	adiw	r24, 0x10	; 16
+     156:	8d bf       	out	0x3d, r24
+     157:	8d b7       	in	r24, 0x3d	; 61
+     158:	08 97       	sbiw	r24, 0x08	; 8
+     159:	8d bf       	out	0x3d, r24
+     15a:	08 95       	ret
+
+00000160 <a_leaf>:
+     160:	21 97       	sbiw	r28, 0x01	; 1
+     162:	08 95       	ret
 """
 
 
@@ -98,7 +121,7 @@ def test_a_frame_that_no_instruction_can_name_is_that_of_a_register():
 def test_an_avr_leaves_the_way_back_on_the_stack_and_lowers_a_copy_of_its_pointer():
     known = routines(AVR, back=3)
     assert {name: one.frame for name, one in known.items()} == {
-        "a_control": 3 + 2 + 3 + 10, "a_inner": 3 + 0x12C, "a_leaf": 3,
+        "a_control": 3 + 2 + 3 + 10, "a_inner": 3 + 0x12C, "a_middle": 3 + 0xF6 + 16, "a_leaf": 3,
     }  # fmt: skip
     assert deepest("a_control", known) == 18 + 303
 
