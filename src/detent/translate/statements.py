@@ -256,7 +256,7 @@ class Statements(Calls):
         self._bound(node, f"at most {max(0, stop.hi - start.lo)} turns: {ast.unparse(node.iter)}")
         counter = self.note(name, whole(name, "", min(lo, stop.lo), stop.hi))
         ctype = type_of_local(counter)
-        text = stop.text
+        text = in_brackets(stop, UNARY)
         if not stop.is_constant:
             end = self.temporary()
             self.pre.append(f"const {ctype} {end} = {self.cast(stop, ctype).text};")
