@@ -685,6 +685,8 @@ BARS_28 = {
     "rotary_table": {"interrupt": (2500, 6700)},
     "print_head": {"emitter": (750, 1800), "decide": (700, 1600), "fired": (300, 500)},
 }  # instructions of the longest call
+CALLED_28 = {"phase_servo": 5_000, "zoom": 100_000, "print_head": WHOLE["print_head"]}
+"""Ticks of the job in which calls are noted, with plain steps: in these a stepper is at speed, and the letter printed."""
 TICKS_28 = {
     "cascade": (6500, 16000),
     "filtered_servo": (2839 + 10 * 430, 6855 + 10 * 1250),
@@ -781,7 +783,7 @@ def test_28_what_the_longest_tick_of_each_takes(counted, method):
 def test_27_28_calls_as_the_specification_lists_them(tmp_path, method):
     """Instructions and stack of each call, in every state to which the job of the simulation comes."""
     needs(*CORTEX)
-    found = counted_calls(method, WHOLE.get(method, LONG if method != "phase_servo" else 5_000), CORTEX, tmp_path)
+    found = counted_calls(method, CALLED_28.get(method, LONG), CORTEX, tmp_path)
     for k, target in enumerate(CORTEX):
         for name, bars in BARS_28[method].items():
             assert 0.05 * bars[k] < found[target][name].most <= bars[k], (target, name)
