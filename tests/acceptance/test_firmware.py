@@ -1124,6 +1124,7 @@ def test_31_a_change_that_does_not_fit_is_refused_with_its_line(tmp_path, name, 
 @pytest.mark.long
 def test_29_export_and_verify_take_no_more_processor_time_than_stated(tmp_path):
     """One after the other, none of it in parallel: on a machine that does nothing else this is the time on the wall."""
+
     def taken(command: str) -> float:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         done = run(f"{sys.executable} -m detent {command}", tmp_path)
