@@ -48,6 +48,7 @@ WIDE = 1 << 30  # magnitude of the largest integer of 64 bits
 NO_NUMBER = 0x7FF8 << 48  # bits of what is none, whatever a processor makes of it
 SEED = 1
 ROOTS = ("p", "c", "l")
+AS_DECLARED = Shape()  # lengths and ranges are those of the declarations
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,13 @@ class Row:
 
 
 def rows_of(  # noqa: PLR0913 - it calls itself for blocks
-    registers: Registers, root: str, options: Any, shape: Shape, prefix: str = "", offset: int = 0, by: str = ""
+    registers: Registers,
+    root: str,
+    options: Any,
+    shape: Shape = AS_DECLARED,
+    prefix: str = "",
+    offset: int = 0,
+    by: str = "",
 ) -> Iterator[tuple[Row, str]]:
     """Every register that is in the structure in C, with who writes it."""
     for declared in type(registers).__fields__.values():

@@ -1,7 +1,7 @@
 """Parameters of a controller that a job changes while it runs: another set at a tick, as firmware exchanges it.
 
-Every job file that is a list of tables may have them, whatever the method: its model derives from `Changing`, its job
-carries `ParameterChange`s, and its run lays them with `lay_changes`. Of an axis with several motors a name begins with
+Every job file that is a list of tables may have them, whatever the method: its model has `change_rows`, its job carries
+`ParameterChange`s, and its run lays them with `lay_changes`. Of an axis with several motors a name begins with
 that of the motor.
 """
 
@@ -26,10 +26,9 @@ class ChangeRow(Table, frozen=True):
     value: float = required("its value from then on, in the unit of params.csv", "45.0")
 
 
-class Changing(Table, frozen=True):
-    """A job file in which parameters may change."""
-
-    parameter_change: list[ChangeRow] = rows("a parameter of the controller that changes")
+def change_rows() -> Any:
+    """Declare the key `parameter_change` of a job file, a ``list[ChangeRow]``."""
+    return rows("a parameter of the controller that changes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +49,11 @@ class ParameterChange:
         setattr(attrgetter(block)(params) if block else params, last, value)
 
 
-def read_changes(source: Source, found: Changing) -> tuple[ParameterChange, ...]:
+def read_changes(source: Source, found: Sequence[ChangeRow]) -> tuple[ParameterChange, ...]:
     """The changes of a job file."""
     return tuple(
         ParameterChange(source.line_of("parameter_change", number), **row.model_dump())
-        for number, row in enumerate(found.parameter_change)
+        for number, row in enumerate(found)
     )
 
 

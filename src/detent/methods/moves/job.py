@@ -12,14 +12,14 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
-from detent.files.fields import optional, rows
+from detent.files.fields import Table, optional, rows
 from detent.files.quantities import Angle, AngularVelocity, Length, Time, Velocity
 from detent.files.read import Row, check_values, read_tables
 from detent.files.read_csv import CsvRows
 from detent.files.screen import OnScreen
 from detent.files.source import parse_source
 from detent.files.text import decode_utf8, read_data
-from detent.methods.changes import Changing, ParameterChange, read_changes
+from detent.methods.changes import ChangeRow, ParameterChange, change_rows, read_changes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,11 +62,12 @@ class RotaryMoveRow(MoveRow, frozen=True):
     speed: AngularVelocity | None = optional("speed of this move", None, derived="the axis's own", gt=0)
 
 
-class MoveFile(Changing, Generic[AnyRow], frozen=True):
+class MoveFile(Table, Generic[AnyRow], frozen=True):
     """A file of moves."""
 
     repeat: int = optional("number of repetitions of the whole list", 1, ge=1, le=MOST_MOVES)
     move: list[AnyRow] = rows("a move")
+    parameter_change: list[ChangeRow] = change_rows()
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +241,7 @@ def _parse_moves(file: Path, text: str, model: type[MoveRow]) -> MoveJob:
         found = read_tables(source, MoveFile[model])
         repeat = found.repeat
         made = [_make_move(source.line_of("move", number), row) for number, row in enumerate(found.move)]
-        changes = read_changes(source, found)
+        changes = read_changes(source, found.parameter_change)
     return MoveJob(file.name, "moves", expand_moves(str(file), made, repeat), changes)
 
 

@@ -12,11 +12,11 @@ from os import PathLike
 from pathlib import Path
 
 from detent.errors import InputError
-from detent.files.fields import required
+from detent.files.fields import Table, required
 from detent.files.read import read_tables
 from detent.files.source import parse_source
 from detent.files.text import MAX_BYTES, read_text, reading, refuse_longer
-from detent.methods.changes import Changing, read_changes
+from detent.methods.changes import ChangeRow, change_rows, read_changes
 from detent.methods.print_head.diablo630 import parse_diablo
 from detent.methods.print_head.printed_page import LINE, WHEEL_PITCH, PrintedCharacter, PrintJob, Reading
 
@@ -31,10 +31,11 @@ _MAX_MEANINGLESS_SHARE = 0.1
 _WHAT_A_JOB_IS = "a text file, or a stream for the Diablo 630 printer"
 
 
-class PrintFile(Changing, frozen=True):
+class PrintFile(Table, frozen=True):
     """A file to print, and parameters that change meanwhile."""
 
     print: str = required("file to print, from where this file is", '"letter.txt"')
+    parameter_change: list[ChangeRow] = change_rows()
 
 
 def load_job(path: str | PathLike[str]) -> PrintJob:
@@ -44,7 +45,9 @@ def load_job(path: str | PathLike[str]) -> PrintJob:
         return _load_print(file)
     source = parse_source(str(file), read_text(file, (".toml",), "a file to print, and what changes meanwhile (.toml)"))
     found = read_tables(source, PrintFile)
-    return replace(_load_print(file.parent / found.print), name=file.name, changes=read_changes(source, found))
+    return replace(
+        _load_print(file.parent / found.print), name=file.name, changes=read_changes(source, found.parameter_change)
+    )
 
 
 def _load_print(file: Path) -> PrintJob:

@@ -9,13 +9,13 @@ from os import PathLike
 from pathlib import PurePath
 
 from detent.errors import FileProblem, InputError
-from detent.files.fields import rows
+from detent.files.fields import Table, rows
 from detent.files.locate import Index
 from detent.files.problems import Reporter
 from detent.files.read import read_tables, refuse
 from detent.files.source import parse_source
 from detent.files.text import read_text
-from detent.methods.changes import Changing, read_changes
+from detent.methods.changes import ChangeRow, change_rows, read_changes
 from detent.methods.rotary_table.sequence_job import (
     MOST_STEPS,
     Action,
@@ -39,11 +39,12 @@ WHAT_A_JOB_IS = "a sequence of steps (.toml)"
 LONGEST_JOB = 1e6  # longest time that the steps of a job may take by what they say, repeats counted [s]
 
 
-class SequenceFile(Changing, frozen=True):
+class SequenceFile(Table, frozen=True):
     """A sequence: its steps, and the stretches of its input signals."""
 
     input: list[InputRow] = rows("a stretch of time in which an input signal is on")
     step: list[StepRow] = rows("a step")
+    parameter_change: list[ChangeRow] = change_rows()
 
 
 def load_sequence(path: str | PathLike[str]) -> SequenceJob:
@@ -63,7 +64,7 @@ def parse_sequence(file: str, text: str) -> SequenceJob:
     for row in found.input:
         stretches.setdefault(row.name, []).append((row.begin, row.end))
     inputs = {name: join_stretches(found) for name, found in stretches.items()}
-    job = SequenceJob(PurePath(file).name, tuple(steps), inputs, changes=read_changes(source, found))
+    job = SequenceJob(PurePath(file).name, tuple(steps), inputs, changes=read_changes(source, found.parameter_change))
     if faults := find_faults(job):
         reporter = Reporter(file, source.places, {}, SequenceFile)
         refuse(reporter.placed(("step", Index(number)), fault) for number, fault in faults)

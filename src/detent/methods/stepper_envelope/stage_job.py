@@ -387,7 +387,7 @@ def load_stage_job(path: str | PathLike[str], motors: Sequence[str], turning: fr
         model: Any = stage_row(tuple(motors), StageRow, turning)
         found = read_tables(source, cast("type[MoveFile[StageRow]]", MoveFile[model]))
         made = [_make_move(source.line_of("move", number), row) for number, row in enumerate(found.move)]
-        repeat, changes = found.repeat, read_changes(source, found)
+        repeat, changes = found.repeat, read_changes(source, found.parameter_change)
     moves = expand_moves(str(file), made, repeat, missing=f"add a move with a place for {' or '.join(motors)}")
     named = {motor for move in moves for motor in move.motors}
     return StageJob(file.name, kind, moves, tuple(motor for motor in motors if motor in named), notes, changes)
