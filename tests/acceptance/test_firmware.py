@@ -686,7 +686,7 @@ BARS_28 = {
     "print_head": {"emitter": (750, 1800), "decide": (700, 1600), "fired": (300, 500)},
 }  # instructions of the longest call
 CALLED_28 = {"phase_servo": 5_000, "zoom": 100_000, "print_head": WHOLE["print_head"]}
-"""Ticks of the job in which calls are noted, with plain steps: in these a stepper is at speed, and the letter printed."""
+"""Ticks of the job in which calls are noted, with plain steps: a stepper is then at speed, and the letter printed."""
 TICKS_28 = {
     "cascade": (6500, 16000),
     "filtered_servo": (2839 + 10 * 430, 6855 + 10 * 1250),

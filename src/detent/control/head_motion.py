@@ -199,9 +199,9 @@ def put_braking(p: HeadParams, c: HeadComputer) -> None:
 def growing_interval(c: HeadComputer) -> int:
     """Latest emitter interval, or the time since that emitter once it is longer: a head that stands is not fast.
 
-    A longer one than `LONG` compares as that.
+    A longer one than `LONG` compares as that at every speed value, and none is below 0.
     """
-    return min(max(c.interval_us, c.now_us - c.last_emitter_us), LONG)
+    return min(max(c.interval_us, c.now_us - c.last_emitter_us, 0), LONG)
 
 
 @step

@@ -330,3 +330,22 @@ def test_trim_ends_at_nothing_and_at_the_limit(p, c, drive, passed, expected):
     c.phase_start, c.next_trim_us = c.emitter - passed, c.now_us
     steady_timer(p, c)
     assert (c.drive, c.drive_cmd) == (expected, expected)
+
+
+INTERVALS = (-5, 0, 1, 83, 84, 20_000, 20_001, 32_767, 32_768, 32_769, 400_000, 1 << 40)
+
+
+@pytest.mark.parametrize("s", [0, 1, 2, 30, 240])
+@pytest.mark.parametrize("since", [0, 1, 300, 20_000, 32_769, 1 << 41])
+def test_intervals_compare_at_every_speed_as_if_none_were_cut(p, c, s, since):
+    for interval in (*INTERVALS, *(n // max(s, 1) + d for n in (20_000, 320_000 // 17) for d in (-1, 0, 1))):
+        c.direction, c.speed, c.interval_us, c.last_emitter_us = 1, s, interval, c.now_us - since
+        longest = max(interval, since)
+        assert speed_reached(c) is (0 < interval * s <= 20_000)
+        c.drive = 100
+        trim_low(c)
+        faster = 0 < longest * s < 20_000 and interval > 0
+        assert c.drive == 100 + (1 if longest * s > 20_000 else -1 if faster else 0)
+        c.drive = 100
+        put_low(p, c)
+        assert c.drive_cmd == (50 if interval > 0 and 17 * longest * s < 320_000 else 100)
