@@ -194,10 +194,11 @@ def _print(done: "Identified", outside: list[str]) -> None:
     _print_logs(found)
     if found.estimates:
         print_table(*done.table)
-        for remark in done.remarks:
-            say(f"  {remark}", "yellow")
-        if done.remarks:
-            tell()
+    for remark in done.remarks:
+        say(f"  {remark}", "yellow")
+    if done.remarks:
+        tell()
+    if found.climbs:
         _print_ladder(found)
     if found.horizons:
         _print_horizons(found)

@@ -93,6 +93,8 @@ class Identified(OnScreen):
             limits = f"{one.low * scale:.5g} to {one.high * scale:.5g}" if known else ""
             trust = "yes" if one in self.found.trusted else "no"
             value = f"{text.value} ± {text.half}" if known else "not determined by the data"
+            if one.name in self.found.bounded:
+                value = f"an end of the search, {text.value}"
             rows.append((one.name, value, limits, text.unit, trust))
         by = self.found.estimates[0].method if rows else ""
         title = f"Constants, by {by}" if self.trusted else f"Results by {by}; none of them is trusted"

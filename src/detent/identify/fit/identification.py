@@ -110,6 +110,11 @@ class Identification(OnScreen):
         return "refused" if any(not r.constants for r in self.refusals) or not self.trusted else "partly trusted"
 
     @property
+    def bounded(self) -> tuple[str, ...]:
+        """Constants that a search left at an end of its range: no values, so without limits."""
+        return () if self.constants is None else self.constants.bounded
+
+    @property
     def residuals(self) -> Residuals | None:
         """What the residuals of the regression look like."""
         return None if self.fit is None else residuals_of(self.fit)

@@ -141,7 +141,7 @@ def look_at_constants(run: Run, constants: Constants, parts: Sequence[Prepared])
     velocity = np.concatenate([p.motion.velocity for p in parts])
     top = float(np.quantile(np.abs(velocity), 0.95))
     by_name = {e.name: e for e in constants.estimates(run)}
-    found = [*_not_told(run, by_name, effort, top)]
+    found = [*_not_told(run, by_name, effort, top, constants.bounded)]
     refused = {name for refusal in found for name in refusal.constants}
     found += [r for r in _one_speed(run, velocity, by_name) if not refused >= set(r.constants)]
     found += [_bounded(by_name[name]) for name in constants.bounded if name in by_name]
@@ -151,19 +151,22 @@ def look_at_constants(run: Run, constants: Constants, parts: Sequence[Prepared])
 def _bounded(e: Estimate) -> Refusal:
     """A constant at an end of the range that was searched for it."""
     text = f"{e.name} {e.value:.4g} {e.unit} is an end of the range that was searched, not a value"
-    return Refusal("at a bound", text, "record moves that show it, or take the constants of the regression", (e.name,))
+    record = "moves that show it" if e.name != "delay" else "effort and motion by one clock, unfiltered"
+    return Refusal("at a bound", text, f"record {record}", (e.name,))
 
 
-def _not_told(run: Run, by_name: dict[str, Estimate], effort: float, top: float) -> Iterator[Refusal]:
-    """Constants that are not known well enough."""
+def _not_told(
+    run: Run, by_name: dict[str, Estimate], effort: float, top: float, bounded: Collection[str]
+) -> Iterator[Refusal]:
+    """Constants that are not known well enough; those at an end of what was searched are told as such."""
     mass, delay = by_name["mass"], by_name.get("delay")
     if mass.high <= 0.0:
         text = f"the mass is {mass.value:.4g} {mass.unit}: effort and motion have opposite signs"
         yield Refusal("wrong sign", text, "invert the effort or the position in the mapping")
-    elif not mass.half < WIDEST_MASS * mass.value:
+    elif "mass" not in bounded and not mass.half < WIDEST_MASS * mass.value:
         text = f"mass {mass.value:.4g} +- {mass.half:.2g} {mass.unit}, because there is hardly any acceleration"
         yield Refusal("little acceleration", text, "record moves with short ramps", ("mass",))
-    for e in (by_name[name] for name in FORCES if name in by_name):
+    for e in (by_name[name] for name in FORCES if name in by_name and name not in bounded):
         is_viscous = e.name.startswith("viscous")
         scale = top if is_viscous else 1.0
         if not e.half * scale < WIDEST_FORCE * effort:
@@ -171,7 +174,7 @@ def _not_told(run: Run, by_name: dict[str, Estimate], effort: float, top: float)
             text = f"{e.name} {f'{e.value:.4g} +- {e.half:.2g} {e.unit}' if is_known else 'not determined at all'}"
             record = "steady moves at several speeds" if is_viscous else "slow moves in both directions"
             yield Refusal("not determined by the data", text, f"record {record}", (e.name,))
-    if delay is not None and delay.half > WIDEST_DELAY * run.step:
+    if delay is not None and "delay" not in bounded and delay.half > WIDEST_DELAY * run.step:
         text = f"delay {1e3 * delay.value:.3g} +- {1e3 * delay.half:.2g} ms"
         yield Refusal("not determined by the data", text, "record moves with short ramps, sampled faster", ("delay",))
 
