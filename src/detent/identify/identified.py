@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from detent.errors import DetentError
 from detent.files.marks import is_ours, is_signed, signed
-from detent.files.patch import Change
 from detent.files.screen import Block, OnScreen, Screen
 from detent.files.source import read_source
 from detent.files.text import write_text
@@ -17,15 +16,15 @@ from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification, Method, Verdict, identify
 from detent.identify.fit.verdict import Refusal
 from detent.identify.remarks import remarks_of
-from detent.identify.write.file_numbers import Contrast, contrasts
-from detent.identify.write.outputs import axis_toml, cascade_spec, excitation_job, patched_axis
 from detent.logs.differences import with_position
 from detent.logs.log import Log
 from detent.logs.read_log import read_log
-from detent.methods.cascade.schema import CascadeSpec
 from detent.page.table import TextTable
 
 if TYPE_CHECKING:
+    from detent.files.patch import Change
+    from detent.identify.write.file_numbers import Contrast
+    from detent.methods.cascade.schema import CascadeSpec
     from detent.record.machine import Progress
 
 MOST_REFUSALS = 5  # refusals told at a prompt
@@ -131,7 +130,7 @@ class Identified(OnScreen):
         """What to know about constants that would be read wrongly, such as a delay below 0."""
         return remarks_of(self.found)
 
-    def contrasts(self) -> list[Contrast]:
+    def contrasts(self) -> "list[Contrast]":
         """Constants that the axis file states outside of their intervals; none without an axis file.
 
         Raises
@@ -139,8 +138,11 @@ class Identified(OnScreen):
         DetentError
             The axis is of another kind of motion, or has no effort like that of the logs.
         """
-        spec = self._spec()
-        return [] if spec is None else contrasts(self.found, spec)
+        if (spec := self._spec()) is None:
+            return []
+        from detent.identify.write.file_numbers import contrasts
+
+        return contrasts(self.found, spec)
 
     def save(self, path: str | Path, *, force: bool = False) -> Path:
         """Write an axis file: that of the axis with the identified constants, or a new one.
@@ -163,6 +165,8 @@ class Identified(OnScreen):
             The file cannot be written, or its axis is of another kind; or another axis file than that of the axis
             stands there, which detent did not write.
         """
+        from detent.identify.write.outputs import axis_toml, patched_axis
+
         path = Path(path)
         base = self._base(path, force=force)
         if base is None:
@@ -172,8 +176,10 @@ class Identified(OnScreen):
         own = base is not None and self._is_put_into(path, force=force)
         return write_text(path, made if own and not is_signed(str(base)) else signed(made), force=force or own)
 
-    def changes(self, path: str | Path, *, force: bool = False) -> list[Change]:
+    def changes(self, path: str | Path, *, force: bool = False) -> "list[Change]":
         """What `save` changes of an axis file: each key with its value before and after; nothing of a new file."""
+        from detent.identify.write.outputs import patched_axis
+
         base = self._base(Path(path), force=force)
         return [] if base is None else patched_axis(self.found, base, self._name(Path(path)))[1]
 
@@ -205,6 +211,8 @@ class Identified(OnScreen):
         DetentError
             The limits are not known, or the file cannot be written.
         """
+        from detent.identify.write.outputs import excitation_job
+
         return write_text(path, signed(excitation_job(self.found, self._spec())), force=force)
 
     def report(self, path: str | Path, *, force: bool = False) -> Path:
@@ -227,8 +235,8 @@ class Identified(OnScreen):
             "remarks": list(self.remarks),
         }
 
-    def _spec(self) -> CascadeSpec | None:
-        return cascade_spec(self.axis, self.axis_name) if self.axis else None
+    def _spec(self) -> "CascadeSpec | None":
+        return _spec_of(self.axis, self.axis_name) if self.axis else None
 
 
 def _text_of(axis: str | Path) -> str:
@@ -242,8 +250,15 @@ def _checked_text(axis: str | Path) -> str:
 
     read_axis(axis)
     text = _text_of(axis)
-    cascade_spec(text, str(axis))
+    _spec_of(text, str(axis))
     return text
+
+
+def _spec_of(text: str, name: str) -> "CascadeSpec":
+    # What writes axis files, and their schema, is loaded where there is one: it takes as long as a fit.
+    from detent.identify.write.outputs import cascade_spec
+
+    return cascade_spec(text, name)
 
 
 def identify_axis(  # noqa: PLR0913 - the options of `detent identify`

@@ -189,6 +189,6 @@ def _wander(name: str, records: tuple[Estimate | None, ...]) -> Wander:
     widened = [1.0 / (between + error**2) for error in errors]
     centre = math.fsum(w * one.value for w, one in zip(widened, known, strict=True)) / math.fsum(widened)
     error = math.sqrt(between + 1.0 / math.fsum(widened))
-    changed = q > float(scipy("stats").chi2.isf(FAR, k - 1))
+    changed = q > float(scipy("special").chdtri(k - 1, FAR))
     method = f"random effects over {k} recordings"
     return Wander(name, records, estimate(name, centre, known[0].unit, error, method, k - 1), changed)

@@ -3,8 +3,6 @@
 from collections.abc import Iterator, Mapping
 
 from detent.errors import DetentError
-from detent.identify.analyse.analyses import analyse
-from detent.identify.analyse.measure_response import told_response
 from detent.identify.analyse.two_speeds import fit_two_speeds
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification
@@ -32,6 +30,10 @@ def two_masses(found: Identification) -> Iterator[str]:
     error = chosen_climb(found.climbs).error if found.climbs else 1.0
     if error < UNEXPLAINED:
         return
+    # Loaded for the few logs that need them.
+    from detent.identify.analyse.analyses import analyse
+    from detent.identify.analyse.measure_response import told_response
+
     for log, run in zip(found.logs, found.runs, strict=True):
         if told_response(log, run.effort_name, is_open=run.reference is None) is None:
             continue

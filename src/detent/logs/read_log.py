@@ -55,6 +55,7 @@ def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None
         rows = row_ranges([broken.row for broken in table.broken])
         table.findings.append(Finding(Kind.BROKEN_ROWS, "", rows, text, Action.REMOVED))
     draft = make_draft(table, chosen, stated)
+    table.columns = {}  # the draft has what was chosen of them
     if not draft.values:
         raise InputError.of_file(str(path), _nothing_left(draft), "at least one signal", "state what the columns are")
     clean(draft)

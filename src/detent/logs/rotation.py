@@ -3,6 +3,8 @@
 They are put right where the file cannot be read otherwise, and where a person says so; never what a person has stated.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,16 +48,17 @@ def mend_rotation(table: RawTable, time: str, *, is_stated: bool = False, is_acc
     if len(table.rows) < SHORTEST:
         return
     names = list(table.columns)
-    matrix = np.column_stack([table.columns[name] for name in names])
+    series = [table.columns[name] for name in names]
     # A clock that runs in most rows tells the step that it has in the others. One that does not is asked elsewhere.
-    ours: Values = matrix[:, names.index(time)]
+    ours = series[names.index(time)]
     own = _usual_step(ours)
     runs, back = np.mean(np.abs(np.diff(ours) - own) <= _EVEN * own), np.mean(np.diff(ours) < 0)
-    found = _best_rotation(matrix, names, names.index(time), own) if runs > _HALF else None
+    found = _best_rotation(series, names, names.index(time), own) if runs > _HALF else None
     if found is None and (runs <= _HALF or back > _MANY):
-        found = _best_rotation(matrix, names, names.index(time), None)
+        found = _best_rotation(series, names, names.index(time), None)
     if found is None:
         return
+    matrix = np.column_stack(series)
     shift, where = found
     is_whole = runs <= _HALF or where.mean() > _WHOLE
     head = _head(table, matrix, names.index(time), shift) if where.mean() > _WHOLE else None
@@ -84,16 +87,15 @@ def _ranges(matrix: Values, names: list[str]) -> str:
     return ", ".join(f'"{short(name)}" {low[k]:.4g} to {high[k]:.4g}' for k, name in enumerate(names))
 
 
-def _best_rotation(matrix: Values, names: list[str], clock: int, step: float | None) -> Rotation | None:
+def _best_rotation(series: Sequence[Values], names: list[str], clock: int, step: float | None) -> Rotation | None:
     """The rotation that the most rows have, of those that bring a clock into its place: of a step, or of its own."""
     best: Rotation | None = None
-    ours: Values = matrix[:, clock]
     for shift in range(1, len(names)):
         column = (clock + shift) % len(names)
         if not _COUNTERS & set(words_of(names[column])):
-            theirs: Values = matrix[:, column]
+            theirs = series[column]
             usual = _usual_step(theirs) if step is None else step
-            where = _rotated_rows(ours, theirs, usual, is_partial=step is not None)
+            where = _rotated_rows(series[clock], theirs, usual, is_partial=step is not None)
             if where.any() and (best is None or where.sum() > best[1].sum()):
                 best = shift, where
     return best

@@ -92,9 +92,11 @@ def find_twins(draft: Draft, role: str) -> Iterator[Twin]:
 
 def _aligned(ours: Values, theirs: Values) -> Values:
     """The second series, taken from as much earlier as the first, its still stretches bridged, follows it."""
-    index = np.arange(len(ours), dtype=np.float64)
     free = _free(ours)
-    bridged = np.interp(index, index[free], ours[free]) if free.any() else ours
+    bridged = ours
+    if free.any() and not free.all():
+        index = np.arange(len(ours), dtype=np.float64)
+        bridged = np.interp(index, index[free], ours[free])
     curve = correlate(bridged, theirs)
     lag = max(0, int(np.argmax(curve)) - len(curve) // 2)
     return np.r_[np.full(lag, theirs[0]), theirs[: len(theirs) - lag]]

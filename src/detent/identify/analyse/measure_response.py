@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
-from detent.logs.differences import scipy
+from detent.logs.differences import products_of, scipy
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
 
@@ -97,7 +97,7 @@ def find_period(values: Values) -> float | None:
 def autocorrelation(values: Values) -> Values:
     """Correlation of a signal with itself, some rows later, over the part in which the two overlap."""
     centred = values - values.mean()
-    products = np.asarray(scipy("signal").correlate(centred, centred, mode="full", method="fft"))[len(values) - 1 :]
+    products = products_of(centred, centred)[len(values) - 1 :]
     sums = np.r_[0.0, np.cumsum(centred**2)]
     early, late = sums[len(values) : 0 : -1], sums[-1] - sums[: len(values)]
     # The sums of the last rows are rounding: what is compared there says nothing.
