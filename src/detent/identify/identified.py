@@ -18,6 +18,7 @@ from detent.identify.fit.verdict import Refusal
 from detent.identify.remarks import remarks_of
 from detent.logs.differences import with_position
 from detent.logs.log import Log
+from detent.logs.parts import split_tests
 from detent.logs.read_log import read_log
 from detent.page.table import TextTable
 
@@ -314,7 +315,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     read: list[Log] = []
     for number, path in enumerate(paths):
         tell(0.1 * number / len(paths), f"reading {Path(path).name}")  # the first tenth of the work
-        read.append(with_position(read_log(path, mapping, columns)))
+        read += map(with_position, split_tests(read_log(path, mapping, columns)))
 
     def report(stage: str, share: float) -> None:
         begin, end, text = _STAGES.get(stage, (0.4, 0.8, stage))

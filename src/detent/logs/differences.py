@@ -13,6 +13,7 @@ from detent.logs.stamps import stretches
 QUANTA = 20.0  # times its grain by which a position should change over a window for rounding and noise not to count
 FARTHEST = 200  # rows up to which a shift is looked for
 MOST_ROWS = 200_000  # rows that tell what all of a longer recording does: every so manieth is looked at
+STEP = 0.25  # part of its span by which a signal changes from one sample to the next where it is stepped
 FEWEST_WINDOWS = 20  # windows that a recording is divided into at least
 
 
@@ -143,6 +144,21 @@ def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """First index and index behind the last of each run of True, shape (k, 2)."""
     edges = np.flatnonzero(np.diff(np.r_[0, mask.astype(np.int8), 0]))
     return edges.reshape(-1, 2)
+
+
+def stepped(values: Values, at_end: NDArray[np.bool_], span: float, *, is_part: bool = False) -> NDArray[np.bool_]:
+    """Samples of runs at an end of a signal into which it is stepped, not cut off: commanded, as a square wave is.
+
+    What is cut off comes to the end by the way that it goes from row to row, a step by a large part of the `span`. The
+    first and the last sample count as steps where others follow: in a part of a recording, or beside a step.
+    """
+    inside = np.zeros(len(values), dtype=np.bool_)
+    for first, last in runs_of(at_end).tolist():
+        before = abs(values[first] - values[first - 1]) > STEP * span if first > 0 else None
+        behind = abs(values[last - 1] - values[last]) > STEP * span if last < len(values) else None
+        sides = [is_step for is_step in (before, behind) if is_step is not None]
+        inside[first:last] = all(sides) and (bool(sides) or is_part)
+    return inside
 
 
 def equal_runs(values: Values, fewest: int) -> NDArray[np.int64]:

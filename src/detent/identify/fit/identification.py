@@ -160,7 +160,7 @@ def identify(
     """Identify an axis from recorded runs."""
     runs = tuple(make_run(log, effort) for log in logs)
     _check_alike(runs)
-    refusals = [r for log, run in zip(logs, runs, strict=True) for r in look_at_log(log, run)]
+    refusals = [r for log, run in zip(logs, runs, strict=True) for r in look_at_log(log, run, runs)]
     parts = choose_windows(runs)
     refusals += look_at_motion(runs, parts)
     windows = sum(len(p.motion.rows) for p in parts)

@@ -14,6 +14,7 @@ from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb, chosen_climb
 from detent.identify.fit.regression import Fit, Prepared, make_effort, residuals_of
 from detent.identify.fit.steadiness import SLIGHT, Change
+from detent.logs.differences import stepped
 from detent.logs.log import Action, Kind, Log, Severity, Values
 
 LEAST_MOTION = 1.0  # time in which the axis really moves [s], at least
@@ -78,8 +79,8 @@ class Refusal:
         return asdict(self)
 
 
-def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:
-    """What is wrong with a log before anything is fitted."""
+def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusal]:
+    """What is wrong with a log before anything is fitted; `runs` are those of all logs that are identified with it."""
     for finding in log.findings:
         is_clock = finding.kind is Kind.DROPPED_ROWS  # rows whose gap the time shows are only left out
         least = (Severity.ERROR,) if is_clock else (Severity.ERROR, Severity.WARNING)
@@ -98,12 +99,19 @@ def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:
     if behind > MOST_LEFT_BEHIND:
         text = f"{log.name}: the reference covers {behind:.0%} of its travel while the position does not change"
         yield Refusal("stuck signal", text, "check the encoder, its cable and the drive enable, and record again")
-    top, bottom = run.effort.max(), run.effort.min()
-    at_ends = np.count_nonzero((run.effort == top) | (run.effort == bottom)) / len(run.effort)
-    saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), at_ends)
+    saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), _share_at_ends(run, runs))
     if saturated > MOST_SATURATED:
         text = f"{log.name}: {run.effort_name} or position is at its limit in {saturated:.0%} of the rows"
         yield Refusal("saturated", text, "record slower or smaller moves that stay within the limit")
+
+
+def _share_at_ends(run: Run, runs: Sequence[Run]) -> float:
+    """Share of the samples whose effort is at its largest or smallest value, and was not put there by a step."""
+    efforts = [one.effort for one in runs] or [run.effort]
+    top, bottom = max(float(effort.max()) for effort in efforts), min(float(effort.min()) for effort in efforts)
+    ends = [run.effort == end for end in {top, bottom}]
+    cut = [end & ~stepped(run.effort, end, top - bottom, is_part=len(efforts) > 1) for end in ends]
+    return float(np.mean(np.logical_or.reduce(cut)))
 
 
 def _share_left_behind(run: Run) -> float:
@@ -247,7 +255,9 @@ def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequ
 
 
 def level_of(effort: Values) -> float:
-    """Distance of the values of an effort from the nearest other value, the root mean square over the samples."""
+    """Distance of the values that an effort goes to from the nearest other value, the root mean square over these."""
+    # A value that it keeps counts once: a command that is stepped is exact, however far its steps are.
+    effort = effort[np.r_[True, np.diff(effort) != 0.0]]
     levels, counts = np.unique(effort, return_counts=True)
     if len(levels) < 2:
         return 0.0
