@@ -262,9 +262,11 @@ def _print_horizons(found: Any) -> None:
     rows: list[tuple[str, ...]] = []
     for one in found.horizons:
         texts = (ways.error(float(value)) for value in (one.rms, one.largest, one.moved))
-        rows.append((one.name, *texts, f"{one.rms / one.moved:.2%}" if one.moved else ""))
+        limits = "" if one.name != "free run" else ways.spread(one.spread)
+        rows.append((one.name, *texts, f"{one.rms / one.moved:.2%}" if one.moved else "", limits))
     title = "Simulated: the last quarter, held out"
-    print_table(title, ("over", "rms error", "largest", "travel", "error/travel"), rows, right=True)
+    heads = ("over", "rms error", "largest", "travel", "error/travel", "95 % by the limits")
+    print_table(title, heads, rows, right=True)
     loop = found.closed_loop
     if loop is not None:
         told = f"rms error {ways.error(loop.rms)}, largest {ways.error(loop.largest)}; effort {loop.effort:.1%} off"

@@ -64,7 +64,7 @@ class Constants:
     @property
     def correlation(self) -> Values:
         """Correlation of the errors, shape (k, k)."""
-        error = np.maximum(self.errors, 1e-300)
+        error = np.maximum(self.errors, 1e-150)
         return np.clip(self.covariance / np.outer(error, error), -1.0, 1.0)
 
     def inseparable(self) -> tuple[tuple[str, str, float], ...]:

@@ -45,10 +45,10 @@ def test_a_good_log_is_trusted_with_constants_near_the_truth(found):
 
 
 def test_the_simulation_of_what_was_not_seen_is_close(found):
-    assert [h.name for h in found.horizons][:3] == ["one step", "0.1 s", "0.5 s"]
+    assert [h.name for h in found.horizons][:3] == ["0.1 s", "0.5 s", "1 s"]
     assert found.horizons[-1].name == "free run"
     assert found.horizons[-1].duration == pytest.approx(2.0, abs=0.02)  # the last quarter
-    assert all(h.rms < 0.05 * h.naive for h in found.horizons[1:])
+    assert all(h.rms < 0.05 * h.naive for h in found.horizons if h.name != "one step")
 
 
 def test_the_constants_that_were_simulated_saw_the_first_part_only(found):
