@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from detent.identify.fit.identification import Method
     from detent.identify.identified import Identified
 
-METHODS = {"regression": "regression", "output-error": "output error"}  # words of --method: the identification's
+# Words of --method: the identification's.
+METHODS = {"auto": "auto", "regression": "regression", "output-error": "output error"}
 COLOURS = {"trusted": "bold green", "partly trusted": "bold yellow", "refused": "bold red"}
 MOST_LINES = 6  # logs, findings and refusals shown; --json and the report have them all
 
@@ -25,7 +26,8 @@ EFFORT = (
     "The signal that drives the axis: force, torque, current, voltage or command. Default: the first one in the log."
 )
 METHOD = (
-    "regression: fits the equations of motion, takes a second; output-error: also fits the simulation to the recording."
+    "regression: fits the equations of motion, takes a second; output-error: also fits the simulation to the "
+    "recording; auto: does so where the regression alone does not predict the motion."
 )
 AXIS = (
     "Cascade axis file: its constants outside the confidence intervals are reported, --write updates it with the "
@@ -52,7 +54,7 @@ def identify(
     mapping: Mapping = None,
     columns: Columns = None,
     effort: Effort = None,
-    method: Annotated[str, option("--method", "WORD", METHOD)] = "regression",
+    method: Annotated[str, option("--method", "WORD", METHOD)] = "auto",
     axis: Annotated[Path | None, option("--axis", "FILE", AXIS)] = None,
     write: Annotated[Path | None, option("--write", "FILE", WRITE)] = None,
     job: Annotated[Path | None, option("--job", "FILE", JOB)] = None,

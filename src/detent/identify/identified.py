@@ -268,7 +268,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     mapping: str | Path | None = None,
     columns: Sequence[str] = (),
     effort: str | None = None,
-    method: Method = "regression",
+    method: Method = "auto",
     axis: str | Path | None = None,
     progress: "Progress | None" = None,
     reading: str = "",
@@ -286,7 +286,8 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     effort : str, optional
         What drives the axis: force, torque, current, voltage or command; by default the first of these in the logs.
     method : str
-        "regression", or "output error", which fits the simulation to the recordings too.
+        "regression"; "output error", which fits the simulation to the recordings too; "auto", which does so where the
+        regression alone does not predict the motion, and takes what predicts better.
     axis : path, optional
         Cascade axis file that the constants are compared with, and put into by `Identified.save`.
     progress : callable, optional

@@ -123,7 +123,7 @@ def compare_records(  # noqa: PLR0913 - the options of `detent identify --compar
     mapping: str | Path | None = None,
     columns: Sequence[str] = (),
     effort: str | None = None,
-    method: Method = "regression",
+    method: Method = "auto",
     progress: "Progress | None" = None,
 ) -> Compared:
     """Identify each recording alone, and say which constants changed between them.

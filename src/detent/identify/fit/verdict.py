@@ -33,6 +33,8 @@ UNTOLD = 0.06  # residual in this distance from which it does: a command that is
 LASTING = 0.9  # correlation of neighbouring residuals from which the model misses something that lasts
 WORST_LASTING = 0.05  # error of the prediction from which that matters
 WORST_MISSED, WORST_FREE = 0.4, 0.8  # error of simulations over the travel: of half a second and more; of the free run
+FAR_OFF = "simulation is far off"
+WELL_MET = 0.2  # the same up to which constants of the simulation fit are taken where the regression's are far off
 BETTER_MISSED = 0.7  # such an error in that of another way to the constants, up to which it is the better one
 WORST_PREDICTION = 0.35  # error of the prediction of held-out segments over the effort, at most
 WORST_SIMULATION = 0.7  # simulated error over that of going on with the velocity of the start, at most
@@ -292,8 +294,8 @@ def _far_off(horizons: Sequence[Horizon]) -> Iterator[Refusal]:
     if off > WORST_MISSED or any(h.rms > WORST_FREE * h.moved for h in free):
         told = ", ".join(f"{h.rms / h.moved:.0%} over {h.name}" for h in _long(horizons))
         text = f"simulated from the effort alone, the axis misses its travel by {told}"
-        record = "fit the simulation itself, --method output-error; or record each direction at several speeds"
-        yield Refusal("simulation is far off", text, record)
+        record = "record each direction at several speeds; behind --method regression, try --method output-error"
+        yield Refusal(FAR_OFF, text, record)
 
 
 def _long(horizons: Sequence[Horizon]) -> list[Horizon]:
