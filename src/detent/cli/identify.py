@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from detent.identify.fit.identification import Method
     from detent.identify.identified import Identified
 
-METHODS = {"regression": "regression", "output-error": "output error"}  # words of --method: the identification's
+# Words of --method: the identification's.
+METHODS = {"auto": "auto", "regression": "regression", "output-error": "output error"}
 COLOURS = {"trusted": "bold green", "partly trusted": "bold yellow", "refused": "bold red"}
 MOST_LINES = 6  # logs, findings and refusals shown; --json and the report have them all
 
@@ -25,7 +26,8 @@ EFFORT = (
     "The signal that drives the axis: force, torque, current, voltage or command. Default: the first one in the log."
 )
 METHOD = (
-    "regression: fits the equations of motion, takes a second; output-error: also fits the simulation to the recording."
+    "regression: fits the equations of motion, takes a second; output-error: also fits the simulation to the "
+    "recording; auto: does so where the regression alone does not predict the motion."
 )
 AXIS = (
     "Cascade axis file: its constants outside the confidence intervals are reported, --write updates it with the "
@@ -52,7 +54,7 @@ def identify(
     mapping: Mapping = None,
     columns: Columns = None,
     effort: Effort = None,
-    method: Annotated[str, option("--method", "WORD", METHOD)] = "regression",
+    method: Annotated[str, option("--method", "WORD", METHOD)] = "auto",
     axis: Annotated[Path | None, option("--axis", "FILE", AXIS)] = None,
     write: Annotated[Path | None, option("--write", "FILE", WRITE)] = None,
     job: Annotated[Path | None, option("--job", "FILE", JOB)] = None,
@@ -194,10 +196,11 @@ def _print(done: "Identified", outside: list[str]) -> None:
     _print_logs(found)
     if found.estimates:
         print_table(*done.table)
-        for remark in done.remarks:
-            say(f"  {remark}", "yellow")
-        if done.remarks:
-            tell()
+    for remark in done.remarks:
+        say(f"  {remark}", "yellow")
+    if done.remarks:
+        tell()
+    if found.climbs:
         _print_ladder(found)
     if found.horizons:
         _print_horizons(found)
@@ -261,9 +264,11 @@ def _print_horizons(found: Any) -> None:
     rows: list[tuple[str, ...]] = []
     for one in found.horizons:
         texts = (ways.error(float(value)) for value in (one.rms, one.largest, one.moved))
-        rows.append((one.name, *texts, f"{one.rms / one.moved:.2%}" if one.moved else ""))
+        limits = "" if one.name != "free run" else ways.spread(one.spread)
+        rows.append((one.name, *texts, f"{one.rms / one.moved:.2%}" if one.moved else "", limits))
     title = "Simulated: the last quarter, held out"
-    print_table(title, ("over", "rms error", "largest", "travel", "error/travel"), rows, right=True)
+    heads = ("over", "rms error", "largest", "travel", "error/travel", "95 % by the limits")
+    print_table(title, heads, rows, right=True)
     loop = found.closed_loop
     if loop is not None:
         told = f"rms error {ways.error(loop.rms)}, largest {ways.error(loop.largest)}; effort {loop.effort:.1%} off"

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from detent.errors import DetentError
 from detent.files.marks import is_ours, is_signed, signed
-from detent.files.patch import Change
 from detent.files.screen import Block, OnScreen, Screen
 from detent.files.source import read_source
 from detent.files.text import write_text
@@ -17,15 +16,16 @@ from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification, Method, Verdict, identify
 from detent.identify.fit.verdict import Refusal
 from detent.identify.remarks import remarks_of
-from detent.identify.write.file_numbers import Contrast, contrasts
-from detent.identify.write.outputs import axis_toml, cascade_spec, excitation_job, patched_axis
 from detent.logs.differences import with_position
 from detent.logs.log import Log
+from detent.logs.parts import split_tests
 from detent.logs.read_log import read_log
-from detent.methods.cascade.schema import CascadeSpec
 from detent.page.table import TextTable
 
 if TYPE_CHECKING:
+    from detent.files.patch import Change
+    from detent.identify.write.file_numbers import Contrast
+    from detent.methods.cascade.schema import CascadeSpec
     from detent.record.machine import Progress
 
 MOST_REFUSALS = 5  # refusals told at a prompt
@@ -93,6 +93,8 @@ class Identified(OnScreen):
             limits = f"{one.low * scale:.5g} to {one.high * scale:.5g}" if known else ""
             trust = "yes" if one in self.found.trusted else "no"
             value = f"{text.value} ± {text.half}" if known else "not determined by the data"
+            if one.name in self.found.bounded:
+                value = f"an end of the search, {text.value}"
             rows.append((one.name, value, limits, text.unit, trust))
         by = self.found.estimates[0].method if rows else ""
         title = f"Constants, by {by}" if self.trusted else f"Results by {by}; none of them is trusted"
@@ -129,7 +131,7 @@ class Identified(OnScreen):
         """What to know about constants that would be read wrongly, such as a delay below 0."""
         return remarks_of(self.found)
 
-    def contrasts(self) -> list[Contrast]:
+    def contrasts(self) -> "list[Contrast]":
         """Constants that the axis file states outside of their intervals; none without an axis file.
 
         Raises
@@ -137,8 +139,11 @@ class Identified(OnScreen):
         DetentError
             The axis is of another kind of motion, or has no effort like that of the logs.
         """
-        spec = self._spec()
-        return [] if spec is None else contrasts(self.found, spec)
+        if (spec := self._spec()) is None:
+            return []
+        from detent.identify.write.file_numbers import contrasts
+
+        return contrasts(self.found, spec)
 
     def save(self, path: str | Path, *, force: bool = False) -> Path:
         """Write an axis file: that of the axis with the identified constants, or a new one.
@@ -161,6 +166,8 @@ class Identified(OnScreen):
             The file cannot be written, or its axis is of another kind; or another axis file than that of the axis
             stands there, which detent did not write.
         """
+        from detent.identify.write.outputs import axis_toml, patched_axis
+
         path = Path(path)
         base = self._base(path, force=force)
         if base is None:
@@ -170,8 +177,10 @@ class Identified(OnScreen):
         own = base is not None and self._is_put_into(path, force=force)
         return write_text(path, made if own and not is_signed(str(base)) else signed(made), force=force or own)
 
-    def changes(self, path: str | Path, *, force: bool = False) -> list[Change]:
+    def changes(self, path: str | Path, *, force: bool = False) -> "list[Change]":
         """What `save` changes of an axis file: each key with its value before and after; nothing of a new file."""
+        from detent.identify.write.outputs import patched_axis
+
         base = self._base(Path(path), force=force)
         return [] if base is None else patched_axis(self.found, base, self._name(Path(path)))[1]
 
@@ -203,6 +212,8 @@ class Identified(OnScreen):
         DetentError
             The limits are not known, or the file cannot be written.
         """
+        from detent.identify.write.outputs import excitation_job
+
         return write_text(path, signed(excitation_job(self.found, self._spec())), force=force)
 
     def report(self, path: str | Path, *, force: bool = False) -> Path:
@@ -225,8 +236,8 @@ class Identified(OnScreen):
             "remarks": list(self.remarks),
         }
 
-    def _spec(self) -> CascadeSpec | None:
-        return cascade_spec(self.axis, self.axis_name) if self.axis else None
+    def _spec(self) -> "CascadeSpec | None":
+        return _spec_of(self.axis, self.axis_name) if self.axis else None
 
 
 def _text_of(axis: str | Path) -> str:
@@ -240,8 +251,15 @@ def _checked_text(axis: str | Path) -> str:
 
     read_axis(axis)
     text = _text_of(axis)
-    cascade_spec(text, str(axis))
+    _spec_of(text, str(axis))
     return text
+
+
+def _spec_of(text: str, name: str) -> "CascadeSpec":
+    # What writes axis files, and their schema, is loaded where there is one: it takes as long as a fit.
+    from detent.identify.write.outputs import cascade_spec
+
+    return cascade_spec(text, name)
 
 
 def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
@@ -250,7 +268,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     mapping: str | Path | None = None,
     columns: Sequence[str] = (),
     effort: str | None = None,
-    method: Method = "regression",
+    method: Method = "auto",
     axis: str | Path | None = None,
     progress: "Progress | None" = None,
     reading: str = "",
@@ -268,7 +286,8 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     effort : str, optional
         What drives the axis: force, torque, current, voltage or command; by default the first of these in the logs.
     method : str
-        "regression", or "output error", which fits the simulation to the recordings too.
+        "regression"; "output error", which fits the simulation to the recordings too; "auto", which does so where the
+        regression alone does not predict the motion, and takes what predicts better.
     axis : path, optional
         Cascade axis file that the constants are compared with, and put into by `Identified.save`.
     progress : callable, optional
@@ -297,7 +316,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     read: list[Log] = []
     for number, path in enumerate(paths):
         tell(0.1 * number / len(paths), f"reading {Path(path).name}")  # the first tenth of the work
-        read.append(with_position(read_log(path, mapping, columns)))
+        read += map(with_position, split_tests(read_log(path, mapping, columns)))
 
     def report(stage: str, share: float) -> None:
         begin, end, text = _STAGES.get(stage, (0.4, 0.8, stage))

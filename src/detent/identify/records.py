@@ -123,7 +123,7 @@ def compare_records(  # noqa: PLR0913 - the options of `detent identify --compar
     mapping: str | Path | None = None,
     columns: Sequence[str] = (),
     effort: str | None = None,
-    method: Method = "regression",
+    method: Method = "auto",
     progress: "Progress | None" = None,
 ) -> Compared:
     """Identify each recording alone, and say which constants changed between them.
@@ -189,6 +189,6 @@ def _wander(name: str, records: tuple[Estimate | None, ...]) -> Wander:
     widened = [1.0 / (between + error**2) for error in errors]
     centre = math.fsum(w * one.value for w, one in zip(widened, known, strict=True)) / math.fsum(widened)
     error = math.sqrt(between + 1.0 / math.fsum(widened))
-    changed = q > float(scipy("stats").chi2.isf(FAR, k - 1))
+    changed = q > float(scipy("special").chdtri(k - 1, FAR))
     method = f"random effects over {k} recordings"
     return Wander(name, records, estimate(name, centre, known[0].unit, error, method, k - 1), changed)

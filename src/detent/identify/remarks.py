@@ -6,18 +6,47 @@ from detent.errors import DetentError
 from detent.identify.analyse.two_speeds import fit_two_speeds
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification
+from detent.identify.fit.ladder import chosen_climb
 from detent.identify.page.words import written
 from detent.logs.log import Log
 from detent.page.words import GAP
+from detent.units import format_quantity
+
+UNEXPLAINED = 0.05  # effort that one mass leaves unexplained from which on a second one is looked for
 
 
 def remarks_of(found: Identification) -> tuple[str, ...]:
     """Remarks about the constants of an identification."""
     named = {one.name: one for one in found.estimates}
     told = list(early(named))
+    told += two_masses(found)
     if len(found.runs) == 1:  # constants of several logs are those of none alone
         told += friction_remarks(found.logs[0], found.runs[0].effort_name, named)
     return tuple(one.replace(GAP, " ") for one in told)
+
+
+def two_masses(found: Identification) -> Iterator[str]:
+    """A log that one mass does not explain, and two masses do, by its frequency response."""
+    error = chosen_climb(found.climbs).error if found.climbs else 1.0
+    if error < UNEXPLAINED:
+        return
+    # Loaded for the few logs that need them.
+    from detent.identify.analyse.analyses import analyse
+    from detent.identify.analyse.measure_response import told_response
+
+    for log, run in zip(found.logs, found.runs, strict=True):
+        if told_response(log, run.effort_name, is_open=run.reference is None) is None:
+            continue
+        answer = analyse(log, "frequency", run.effort_name)
+        seen = {one.name: format_quantity(one.value, "Hz", 3) for one in answer.estimates if one.unit == "Hz"}
+        if answer.reason or "antiresonance" not in seen:
+            continue
+        yield (
+            f"this is two masses: {log.name} shows an anti-resonance at {seen['antiresonance']} and a resonance at "
+            f"{seen['resonance']}, and one mass leaves {error:.0%} of the effort unexplained; try: detent analyse "
+            f"{log.name} --what frequency"
+        )
+        return
 
 
 def early(constants: Mapping[str, Estimate]) -> Iterator[str]:

@@ -12,6 +12,8 @@ from detent.logs.stamps import stretches
 
 QUANTA = 20.0  # times its grain by which a position should change over a window for rounding and noise not to count
 FARTHEST = 200  # rows up to which a shift is looked for
+MOST_ROWS = 200_000  # rows that tell what all of a longer recording does: every so manieth is looked at
+STEP = 0.25  # part of its span by which a signal changes from one sample to the next where it is stepped
 FEWEST_WINDOWS = 20  # windows that a recording is divided into at least
 
 
@@ -29,6 +31,8 @@ class Likeness(NamedTuple):
 
 def resolution(values: Values) -> float:
     """Smallest step between two different values but for rounding, a billionth of the range; 0 for a constant."""
+    # Of a long recording a part that moves is enough: the values of every so manieth row, and neighbours.
+    values = np.r_[values[:: len(values) // MOST_ROWS], values[:MOST_ROWS]] if len(values) > 2 * MOST_ROWS else values
     steps = np.diff(np.unique(values))
     steps = steps[steps > 1e-9 * float(np.ptp(values))]
     return float(steps.min()) if len(steps) else 0.0
@@ -50,14 +54,16 @@ def window_rows(position: Values) -> int:
     return rows
 
 
-def smooth(values: Values, t: Values, rows: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Samples whose window of some rows has no gap, and value, slope and curvature there, shapes (m,) and (3, m)."""
+def smooth(values: Values, t: Values, rows: int, orders: int = 3) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Samples whose window of some rows has no gap, and the first of value, slope and curvature there, (orders, m)."""
     # Uneven stamps are noise here, so the period is the mean.
     parts = [part for part in stretches(t) if part.stop - part.start > rows]
     index = [np.arange(part.start + rows // 2, part.stop - rows // 2, dtype=np.int64) for part in parts]
     periods = [float(t[part][-1] - t[part][0]) / (part.stop - part.start - 1) for part in parts]
-    found = [parabolas(values[part], period, rows) for part, period in zip(parts, periods, strict=True)]
-    return np.concatenate([np.empty(0, np.int64), *index]), np.concatenate([np.empty((3, 0)), *found], axis=1)
+    found = [parabolas(values[part], period, rows, orders) for part, period in zip(parts, periods, strict=True)]
+    if len(parts) == 1:
+        return index[0], found[0]
+    return np.concatenate([np.empty(0, np.int64), *index]), np.concatenate([np.empty((orders, 0)), *found], axis=1)
 
 
 def integral(values: Values, t: Values) -> Values:
@@ -114,10 +120,18 @@ def correlate(ours: Values, theirs: Values) -> Values:
     ours, theirs = ours - ours.mean(), theirs - theirs.mean()
     # Only what lies in the middle takes part, so that each shift compares as many samples.
     middle = theirs[most : len(theirs) - most]
-    products: Values = scipy("signal").correlate(ours, middle, mode="valid", method="fft")
+    products = products_of(ours, middle)[len(middle) - 1 : len(ours)]
     squares = np.cumsum(np.r_[0.0, ours**2])
     sizes = np.sqrt(np.maximum(squares[len(middle) :] - squares[: len(squares) - len(middle)], 1e-300))
     return products / (sizes * (float(np.sqrt(middle @ middle)) or 1.0))
+
+
+def products_of(ours: Values, theirs: Values) -> Values:
+    """Sums of products of two series at all shifts at which they overlap, by a transform, shape (n + m - 1,)."""
+    # SciPy's signal package does the same, and takes longer to load than most logs to identify.
+    fft, count = scipy("fft"), len(ours) + len(theirs) - 1
+    size = fft.next_fast_len(count, real=True)
+    return np.asarray(fft.irfft(fft.rfft(ours, size) * fft.rfft(theirs[::-1], size), size)[:count], np.float64)
 
 
 def peaks_of(curve: Values) -> NDArray[np.intp]:
@@ -130,6 +144,21 @@ def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """First index and index behind the last of each run of True, shape (k, 2)."""
     edges = np.flatnonzero(np.diff(np.r_[0, mask.astype(np.int8), 0]))
     return edges.reshape(-1, 2)
+
+
+def stepped(values: Values, at_end: NDArray[np.bool_], span: float, *, is_part: bool = False) -> NDArray[np.bool_]:
+    """Samples of runs at an end of a signal into which it is stepped, not cut off: commanded, as a square wave is.
+
+    What is cut off comes to the end by the way that it goes from row to row, a step by a large part of the `span`. The
+    first and the last sample count as steps where others follow: in a part of a recording, or beside a step.
+    """
+    inside = np.zeros(len(values), dtype=np.bool_)
+    for first, last in runs_of(at_end).tolist():
+        before = abs(values[first] - values[first - 1]) > STEP * span if first > 0 else None
+        behind = abs(values[last - 1] - values[last]) > STEP * span if last < len(values) else None
+        sides = [is_step for is_step in (before, behind) if is_step is not None]
+        inside[first:last] = all(sides) and (bool(sides) or is_part)
+    return inside
 
 
 def equal_runs(values: Values, fewest: int) -> NDArray[np.int64]:
@@ -147,12 +176,15 @@ def spread(values: Values, rows: int) -> Values:
 
 def fill_holes(mask: NDArray[np.bool_], rows: int) -> NDArray[np.bool_]:
     """The mask with stretches of False of up to some rows between True made True."""
-    padded = np.pad(mask, rows)
-    return np.asarray(scipy("ndimage").binary_closing(padded, structure=np.ones(rows + 1)), dtype=np.bool_)[rows:-rows]
+    filled = mask.copy()
+    for first, last in runs_of(~mask).tolist():
+        if last - first <= rows and first > 0 and last < len(mask):
+            filled[first:last] = True
+    return filled
 
 
-def parabolas(values: Values, period: float, rows: int) -> NDArray[np.float64]:
-    """Value, slope and curvature, in the middle, of the parabola nearest to each window.
+def parabolas(values: Values, period: float, rows: int, orders: int = 3) -> NDArray[np.float64]:
+    """Value, slope and curvature, or the first of these, in the middle, of the parabola nearest to each window.
 
     Savitzky and Golay, Analytical Chemistry 36 (1964) 1627.
 
@@ -161,5 +193,15 @@ def parabolas(values: Values, period: float, rows: int) -> NDArray[np.float64]:
            [ 4.,  6.,  8.],
            [ 2.,  2.,  2.]])
     """
-    kernels = [scipy("signal").savgol_coeffs(rows, 2, deriv=order, delta=period, use="dot") for order in (0, 1, 2)]
-    return np.array([np.correlate(values, np.asarray(kernel), mode="valid") for kernel in kernels])
+    x = np.arange(rows) - 0.5 * (rows - 1)
+    second, fourth = float(np.sum(x**2)), float(np.sum(x**4))
+    spread = rows * fourth - second**2
+    kernels = (
+        (fourth - second * x**2) / spread,
+        x / (second * period),
+        2.0 * (rows * x**2 - second) / (spread * period**2),
+    )
+    found = np.empty((orders, max(len(values) - rows + 1, 0)))
+    for row, kernel in zip(found, kernels, strict=False):
+        row[:] = np.correlate(values, kernel, mode="valid")
+    return found

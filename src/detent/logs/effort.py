@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.logs.differences import correlate, grain, peaks_of, smooth, window_rows
+from detent.logs.differences import MOST_ROWS, correlate, grain, peaks_of, smooth, window_rows
 from detent.logs.headings import EFFORTS
 from detent.logs.log import Action, Draft, Kind, Severity, Values
 
@@ -50,7 +50,12 @@ def find_motion(draft: Draft) -> Motion | None:
 
 def smoothed(values: Values, draft: Draft, motion: Motion) -> Values:
     """A signal through the same windows as a motion, shape (m,): what is compared has the same delay."""
-    return smooth(values, draft.t, motion.rows)[1][0]
+    return smooth(values, draft.t, motion.rows, 1)[1][0]
+
+
+def _taken(motion: Motion, thin: slice) -> Motion:
+    """Some samples of a motion."""
+    return Motion(motion.x[thin].copy(), motion.v[thin].copy(), motion.a[thin].copy(), motion.rows)
 
 
 def find_wrong_effort(draft: Draft) -> None:
@@ -59,11 +64,13 @@ def find_wrong_effort(draft: Draft) -> None:
     motion = find_motion(draft)
     if motion is None:
         return
+    thin = slice(None, None, max(1, len(motion.x) // MOST_ROWS))
+    taken = _taken(motion, thin)
     for role in EFFORTS:
         if role in draft.values:
-            effort = smoothed(draft.values[role], draft, motion)
-            if np.ptp(effort) > 0 and not _find_lost_sign(draft, role, effort, motion):
-                _find_wrong_sign(draft, role, effort, motion)
+            effort = smoothed(draft.values[role], draft, motion)[thin]
+            if np.ptp(effort) > 0 and not _find_lost_sign(draft, role, effort, taken):
+                _find_wrong_sign(draft, role, effort, taken)
 
 
 def terms(motion: Motion) -> NDArray[np.float64]:
@@ -172,13 +179,14 @@ def _move_velocity(draft: Draft, motion: Motion) -> None:
 
 def _late_effort(effort: Values, motion: Motion) -> int:
     """Rows by which an effort fits the motion best when it is taken from later; 0 where it fits as well as it is."""
-    columns = terms(motion)
     most = min(20, len(effort) // 10)
+    thin = slice(most, len(effort) - most, max(1, len(effort) // MOST_ROWS))
+    columns = terms(_taken(motion, thin))
     errors: dict[int, float] = {}
     for lag in range(-most, most + 1):
-        ours = effort[most + lag : len(effort) - most + lag]
-        fit, *_ = np.linalg.lstsq(columns[most:-most], ours, rcond=None)
-        errors[lag] = float(np.var(ours - columns[most:-most] @ fit)) / (float(np.var(ours)) or 1.0)
+        ours = effort[most + lag : len(effort) - most + lag : thin.step]
+        fit, *_ = np.linalg.lstsq(columns, ours, rcond=None)
+        errors[lag] = float(np.var(ours - columns @ fit)) / (float(np.var(ours)) or 1.0)
     best = min(errors, key=lambda lag: errors[lag])
     causal = min(error for lag, error in errors.items() if lag <= 0)
     is_clear = errors[best] < 1 - ALIKE and errors[best] < BETTER * causal

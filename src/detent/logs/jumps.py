@@ -164,7 +164,9 @@ def _dropped(values: Values) -> Mask:
     is_noisy = np.count_nonzero(outside) > (1.0 - NOISY) * len(outside)  # then 0 is no number that it repeats
     found = np.zeros(len(values), dtype=np.bool_)
     for first, last in runs_of(_short(none, BACK)).tolist():
-        before, behind = float(values[max(first - 1, 0)]), float(values[min(last, len(values) - 1)])
+        if first == 0 or last == len(values):  # a drive that is not switched on yet, or no more
+            continue
+        before, behind = float(values[first - 1]), float(values[last])
         is_far = before * behind > 0.0 and min(abs(before), abs(behind)) > 4.0 * usual
         found[first:last] = is_far or (is_noisy and last - first >= REPEATS)
     return found

@@ -118,6 +118,8 @@ class Log(OnScreen):
     guesses: tuple[str, ...] = ()  # what was not stated and had to be guessed, and what was skipped
     # single numbers and texts that the file holds beside its columns
     constants: dict[str, float | str] = field(default_factory=dict[str, float | str])
+    # rows of the file at which tests begin that a column tells apart, with what it says of each
+    tests: tuple[tuple[int, str], ...] = ()
 
     def __len__(self) -> int:
         return len(self.t)
@@ -186,6 +188,8 @@ class Draft:
     guessed_units: set[str] = field(default_factory=set[str])  # roles whose unit was guessed
     findings: list[Finding] = field(default_factory=list[Finding])  # what was found so far
     guesses: list[str] = field(default_factory=list[str])  # what was guessed so far
+    # rows of the file at which tests begin that a column tells apart, with what it says of each
+    tests: list[tuple[int, str]] = field(default_factory=list[tuple[int, str]])
 
     def __len__(self) -> int:
         return len(self.t)

@@ -49,6 +49,8 @@ class RawTable:
     rows: Rows = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     # from the name of a column to the unit its heading states, as written
     units: dict[str, str] = field(default_factory=dict[str, str])
+    # from the name of a column of words to the rows at which it says another one, with that, where it seldom does
+    words: dict[str, list[tuple[int, str]]] = field(default_factory=dict[str, list[tuple[int, str]]])
     # single numbers and texts beside the columns
     constants: dict[str, float | str] = field(default_factory=dict[str, float | str])
     # what had to be guessed about the file, and what was skipped

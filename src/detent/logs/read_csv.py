@@ -17,6 +17,7 @@ from detent.files.text import lines_of, read_bytes, short
 from detent.logs.headings import is_unit, split_heading
 from detent.logs.log import tell_count
 from detent.logs.mapping import SEPARATORS, FileOptions
+from detent.logs.parts import MOST_TESTS, Change, changes_of
 from detent.logs.raw_table import LARGEST_EXACT, BrokenRow, Item, RawTable, check_size
 
 MAX_BYTES = 200_000_000  # longest text table read, unpacked: two hours of ten signals, 200 times a second, are 150 MB
@@ -109,6 +110,7 @@ def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: li
     columns = [index for index in range(len(layout.names)) if index not in layout.text_columns]
     pieces: dict[int, list[NDArray[np.generic]]] = {index: [] for index in columns}
     rows: list[NDArray[np.int64]] = []
+    texts: dict[int, list[Change]] = {index: [] for index in sorted(layout.text_columns)}
     first = 1
     while block := list(islice(cells, BLOCK_ROWS)):
         fitting = _sort_out(table, layout, block, first)
@@ -126,12 +128,15 @@ def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: li
         keep = np.array([row not in wrong for row in fitting], dtype=np.bool_)
         for index, values in zip(columns, found, strict=True):
             pieces[index].append(values[keep])
+        for index, said in texts.items():
+            said.extend(changes_of(across[index], [row + first for row in fitting], said[-1][1] if said else None))
         rows.append(np.array(fitting, dtype=np.int64)[keep] + first)
         first += len(block)
     table.rows = np.concatenate(rows) if rows else table.rows
     for index in columns:
         table.add(Item(layout.names[index], np.concatenate(pieces[index]), layout.units[index]))
     table.broken.sort()
+    table.words = {layout.names[index]: said for index, said in texts.items() if len(said) <= MOST_TESTS}
     words = [short(layout.names[index]) for index in sorted(layout.text_columns)]
     table.notes += [f"text columns skipped: {', '.join(words)}"] if words else []
 

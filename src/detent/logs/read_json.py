@@ -74,14 +74,17 @@ def _characterisation(file: str, items: Record, lists: list[str]) -> RawTable:
 
     A drivetrain has two sides, and the angle and the angular rate of its chassis behind them.
     """
-    rows = sorted((row for key in lists for row in items[key]), key=lambda row: row[0] if row else 0)
+    tests = sorted((key for key in lists if items[key][0]), key=lambda key: items[key][0][0])
+    rows = [row for key in tests for row in items[key]]
     unit = _SYSID_UNITS.get(str(items.get("units")), "")
     sides = ["left", "right"] if rows and len(rows[0]) == 9 else [""]
     signals = [("voltage", "V"), ("position", unit), ("velocity", f"{unit}/s" if unit else "")]
     named = [f"{signal} {side}".strip() + (f" [{said}]" if said else "") for signal, said in signals for side in sides]
     names = ["time [s]", *named, *(["heading", "heading rate"] if len(sides) == 2 else [])]
     table = _from_records(file, [names, *rows], {key: value for key, value in items.items() if key not in lists})
-    table.notes.append(f"tests read as one recording: {', '.join(lists)}")
+    firsts = np.cumsum([1, *(len(items[key]) for key in tests)]).tolist()
+    table.words["test"] = list(zip(firsts, tests, strict=False))
+    table.notes.append(f"tests read as one recording: {', '.join(tests)}")
     return table
 
 

@@ -15,6 +15,7 @@ from detent.logs.effort import find_shifts, find_wrong_effort
 from detent.logs.jumps import find_copies, mend_jumps
 from detent.logs.log import Action, Draft, Finding, Kind, Log, Severity, row_ranges, tell_count
 from detent.logs.mapping import ColumnMapping, FileOptions, load_mapping, parse_options
+from detent.logs.parts import find_tests, lay_behind
 from detent.logs.raw_table import RawTable
 from detent.logs.read_arrays import read_hdf5, read_mat, read_npz, read_parquet
 from detent.logs.read_csv import read_csv
@@ -55,6 +56,9 @@ def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None
         rows = row_ranges([broken.row for broken in table.broken])
         table.findings.append(Finding(Kind.BROKEN_ROWS, "", rows, text, Action.REMOVED))
     draft = make_draft(table, chosen, stated)
+    if "time" in chosen:
+        draft.tests = find_tests(table, chosen["time"], list(chosen.values()))
+    table.columns = {}  # the draft has what was chosen of them
     if not draft.values:
         raise InputError.of_file(str(path), _nothing_left(draft), "at least one signal", "state what the columns are")
     clean(draft)
@@ -79,6 +83,7 @@ def read_table(path: str | Path, options: FileOptions | None = None, *, apart: b
 def clean(draft: Draft) -> None:
     """Find and mend what is wrong with a recording: the clock, the cells, the counters, then what physics says."""
     # Each check works on what the ones before have mended. Counters wrap and clocks tick in the numbers of the file.
+    lay_behind(draft)
     mend_clock(draft)
     mend_missing(draft)
     mend_counters(draft)
@@ -150,4 +155,15 @@ def _finish(name: str, table: RawTable, draft: Draft) -> Log:
     units = {role: draft.units[role] for role in sources}
     findings = sorted(draft.findings, key=lambda finding: _ORDER.index(finding.severity))
     values = {role: np.ascontiguousarray(found) for role, found in draft.values.items()}
-    return Log(name, t, values, units, sources, draft.rows, tuple(findings), tuple(draft.guesses), table.constants)
+    return Log(
+        name,
+        t,
+        values,
+        units,
+        sources,
+        draft.rows,
+        tuple(findings),
+        tuple(draft.guesses),
+        table.constants,
+        tuple(draft.tests),
+    )

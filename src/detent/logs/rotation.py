@@ -3,6 +3,8 @@
 They are put right where the file cannot be read otherwise, and where a person says so; never what a person has stated.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,16 +48,17 @@ def mend_rotation(table: RawTable, time: str, *, is_stated: bool = False, is_acc
     if len(table.rows) < SHORTEST:
         return
     names = list(table.columns)
-    matrix = np.column_stack([table.columns[name] for name in names])
+    series = [table.columns[name] for name in names]
     # A clock that runs in most rows tells the step that it has in the others. One that does not is asked elsewhere.
-    ours: Values = matrix[:, names.index(time)]
+    ours = series[names.index(time)]
     own = _usual_step(ours)
     runs, back = np.mean(np.abs(np.diff(ours) - own) <= _EVEN * own), np.mean(np.diff(ours) < 0)
-    found = _best_rotation(matrix, names, names.index(time), own) if runs > _HALF else None
+    found = _best_rotation(series, names, names.index(time), own) if runs > _HALF else None
     if found is None and (runs <= _HALF or back > _MANY):
-        found = _best_rotation(matrix, names, names.index(time), None)
+        found = _best_rotation(series, names, names.index(time), None)
     if found is None:
         return
+    matrix = np.column_stack(series)
     shift, where = found
     is_whole = runs <= _HALF or where.mean() > _WHOLE
     head = _head(table, matrix, names.index(time), shift) if where.mean() > _WHOLE else None
@@ -84,18 +87,20 @@ def _ranges(matrix: Values, names: list[str]) -> str:
     return ", ".join(f'"{short(name)}" {low[k]:.4g} to {high[k]:.4g}' for k, name in enumerate(names))
 
 
-def _best_rotation(matrix: Values, names: list[str], clock: int, step: float | None) -> Rotation | None:
+def _best_rotation(series: Sequence[Values], names: list[str], clock: int, step: float | None) -> Rotation | None:
     """The rotation that the most rows have, of those that bring a clock into its place: of a step, or of its own."""
+    # A motion may run like a clock, too, in as many rows, but not as exactly by its step.
     best: Rotation | None = None
-    ours: Values = matrix[:, clock]
+    most = 0.0
     for shift in range(1, len(names)):
         column = (clock + shift) % len(names)
         if not _COUNTERS & set(words_of(names[column])):
-            theirs: Values = matrix[:, column]
+            theirs = series[column]
             usual = _usual_step(theirs) if step is None else step
-            where = _rotated_rows(ours, theirs, usual, is_partial=step is not None)
-            if where.any() and (best is None or where.sum() > best[1].sum()):
-                best = shift, where
+            where = _rotated_rows(series[clock], theirs, usual, is_partial=step is not None)
+            steps = _missed(np.diff(theirs), usual)[where[1:] & where[:-1]] if where.any() else np.ones(1)
+            if (score := float(np.sum(1.0 - steps))) > most:
+                best, most = (shift, where), score
     return best
 
 
@@ -136,9 +141,11 @@ def _edges(theirs: Values, ours: Values) -> tuple[int, int]:
     # by the column within, by the clock outside, and by both in the step into a rotated row and in the one out of it.
     n, cut = len(theirs), 1.0 - np.minimum(theirs, ours)
     inside, outside = np.r_[0.0, np.cumsum(theirs)], np.r_[0.0, np.cumsum(ours), float(ours.sum())]
-    last = n - int(np.argmin((inside + np.r_[cut, 0.0] + outside[n] - outside[1:])[::-1]))
-    before = np.r_[0.0, outside[:last] + cut[:last]]
-    return int(np.argmin(before - inside[: last + 1])), last
+    # Both together: rows before the first that the column misses by little each would hide an end chosen alone.
+    before = np.r_[0.0, outside[:n] + cut] - inside
+    behind = inside + np.r_[cut, 0.0] + outside[n] - outside[1:]
+    last = n - int(np.argmin((np.minimum.accumulate(before) + behind)[::-1]))
+    return int(np.argmin(before[: last + 1])), last
 
 
 def _missed(steps: Values, step: float) -> Values:

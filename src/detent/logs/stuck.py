@@ -15,6 +15,7 @@ from detent.logs.differences import (
     resolution,
     runs_of,
     spread,
+    stepped,
     window_rows,
 )
 from detent.logs.log import Action, Draft, Kind, Severity, Values, tell_count
@@ -36,6 +37,7 @@ _FEWEST_WINDOWS = 20
 _SMALL_WINDOW = 4
 # Signals that a limit can cut off. Positions rest where they are told to, and a velocity has plateaus.
 LIMITED = ("command", "voltage", "current", "force", "torque")
+MOSTLY_STEPPED = 0.9  # share of the rows at an end into which a signal is stepped from which on it is commanded
 PLATEAU = 3  # rows at the extreme value from which it is a plateau
 FEWEST_CUT = 10  # rows at the extreme value, in plateaus, from which the signal is cut off there
 FEWEST_LEVELS = 20  # different numbers below which a signal is one of levels, such as a square wave or a staircase
@@ -92,9 +94,11 @@ def find_twins(draft: Draft, role: str) -> Iterator[Twin]:
 
 def _aligned(ours: Values, theirs: Values) -> Values:
     """The second series, taken from as much earlier as the first, its still stretches bridged, follows it."""
-    index = np.arange(len(ours), dtype=np.float64)
     free = _free(ours)
-    bridged = np.interp(index, index[free], ours[free]) if free.any() else ours
+    bridged = ours
+    if free.any() and not free.all():
+        index = np.arange(len(ours), dtype=np.float64)
+        bridged = np.interp(index, index[free], ours[free])
     curve = correlate(bridged, theirs)
     lag = max(0, int(np.argmax(curve)) - len(curve) // 2)
     return np.r_[np.full(lag, theirs[0]), theirs[: len(theirs) - lag]]
@@ -244,7 +248,8 @@ def _find_plateau(draft: Draft, role: str, side: float) -> None:
     is_end = side * values == levels[-1]
     runs = runs_of(is_end)
     is_piled = counts[-1] >= max(FEWEST_CUT, PILED * float(counts[-1 - NEIGHBOURS : -1].max(initial=0)))
-    if is_piled and (runs[:, 1] - runs[:, 0]).max() >= PLATEAU:
+    is_commanded = stepped(values, is_end, float(np.ptp(values)))[is_end].mean() > MOSTLY_STEPPED
+    if is_piled and not is_commanded and (runs[:, 1] - runs[:, 0]).max() >= PLATEAU:
         end, where, factor = side * float(levels[-1]), np.flatnonzero(is_end), abs(draft.sources[role].factor)
         is_symmetric = bool(np.isclose(values.max(), -values.min(), rtol=1e-3))
         is_full = any(np.isclose(abs(end) / factor, scale, rtol=1e-9) for scale in _FULL_SCALES)

@@ -1,7 +1,10 @@
 """The command `detent identify`: what it says, what it writes, and what it refuses."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -219,3 +222,19 @@ def test_no_limits_for_a_job_leave_the_findings_and_status_2() -> None:
     assert answer.status == 2
     assert answer.out.startswith("Refused:")
     assert "not written: log.csv: got a log without motion" in answer.out
+
+
+@pytest.mark.process
+def test_an_identification_loads_nothing_that_takes_longer_than_its_fit(tmp_path: Path) -> None:
+    """Of SciPy's packages these load longer than 25 s at 1 kHz to identify; the schema of axis files as long."""
+    heavy = {"scipy.signal", "scipy.stats", "detent.methods.cascade.schema", "matplotlib"}
+    code = (
+        "import sys\nfrom detent.cli.app import main\nsys.argv = ['detent', 'identify', sys.argv[1]]\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        f"print('loaded:', sorted({heavy} & set(sys.modules)))"
+    )
+    command = [sys.executable, "-c", code, write_log(tmp_path / "log.csv")]
+    path = os.environ | {"PYTHONPATH": str(Path(detent.__file__).parents[1])}
+    done = subprocess.run(command, env=path, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("Trusted: ")
+    assert done.stdout.splitlines()[-1] == "loaded: []"

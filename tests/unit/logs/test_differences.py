@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage, signal
 
 from detent.logs.differences import (
+    MOST_ROWS,
     correlate,
     equal_runs,
     fill_holes,
@@ -12,6 +14,7 @@ from detent.logs.differences import (
     likeness,
     paired_changes,
     parabolas,
+    products_of,
     resolution,
     runs_of,
     spread,
@@ -95,3 +98,35 @@ def test_parabolas_are_exact_for_parabolas():
     assert value == pytest.approx(2 + 3 * middle - 4 * middle**2)
     assert slope == pytest.approx(3 - 8 * middle)
     assert bend == pytest.approx(np.full(len(middle), -8.0), rel=1e-6)
+
+
+@pytest.mark.parametrize(("n", "m"), [(400, 300), (401, 401), (37, 5), (1000, 999)])
+def test_products_at_all_shifts_are_those_of_a_correlation(n: int, m: int) -> None:
+    a, b = RNG.normal(size=n), RNG.normal(size=m)
+    assert products_of(a, b) == pytest.approx(signal.correlate(a, b, mode="full", method="direct"), abs=1e-10)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 8, 30])
+def test_holes_are_filled_as_a_closing_does(rows: int) -> None:
+    """The closing of images: dilated, then eroded by a line of one more than the longest hole."""
+    for share in (0.0, 0.1, 0.5, 0.9, 1.0):
+        mask = RNG.random(300) < share
+        padded = np.pad(mask, rows)
+        assert (fill_holes(mask, rows) == ndimage.binary_closing(padded, np.ones(rows + 1))[rows:-rows]).all()
+
+
+@pytest.mark.parametrize("rows", [3, 4, 5, 12, 81])
+def test_parabolas_are_those_of_savitzky_and_golay(rows: int) -> None:
+    x = RNG.normal(size=200)
+    for order, found in enumerate(parabolas(x, 0.02, rows)):
+        kernel = signal.savgol_coeffs(rows, 2, deriv=order, delta=0.02, use="dot")
+        assert found == pytest.approx(np.correlate(x, kernel, mode="valid"), rel=1e-9, abs=1e-9 * np.abs(found).max())
+    assert (parabolas(x, 0.02, rows, 1) == parabolas(x, 0.02, rows)[:1]).all()
+
+
+def test_a_part_of_a_long_recording_tells_its_resolution() -> None:
+    """It rests at its begin: the values of later rows count, too."""
+    t = np.arange(5 * MOST_ROWS) * 1e-4
+    for step in (1e-3, 1e-6):
+        values = np.where(t < 25.0, 0.0, np.round(np.sin(0.3 * (t - 25.0)) / step) * step)
+        assert resolution(values) == pytest.approx(step, rel=1e-6)

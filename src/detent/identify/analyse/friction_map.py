@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from detent.errors import DetentError
 from detent.identify.analyse.two_speeds import find_steady, find_velocity
 from detent.identify.fit.estimate import LEVEL, Estimate, estimate, quantile
-from detent.logs.differences import grain, scipy, smooth, window_rows
+from detent.logs.differences import grain, products_of, scipy, smooth, window_rows
 from detent.logs.log import Log, Values
 
 FEWEST_WINDOWS = 5.0  # independent windows of a bin, at least
@@ -171,8 +171,7 @@ def memory_rows(residual: Values, place: NDArray[np.int64]) -> float:
     rows = int(place[-1]) - first + 1
     series, mask = np.zeros(rows), np.zeros(rows)
     series[place - first], mask[place - first] = residual, 1.0
-    correlate = scipy("signal").correlate
-    products, pairs = (np.asarray(correlate(x, x, method="fft"), float)[rows - 1 :] for x in (series, mask))
+    products, pairs = (products_of(x, x)[rows - 1 :] for x in (series, mask))
     known = pairs > 0.5
     rho = np.where(known, products / np.maximum(pairs, 1.0), 0.0) * len(residual) / power
     memory = 2.0 * np.cumsum(rho) - 1.0
@@ -205,7 +204,7 @@ def _dip(direction: str, found: list[_Bin], unit: str) -> Dip:
     error = float(np.hypot(lowest.error, least.error))
     degrees = min(lowest.windows, least.windows) - 1.0
     # One-sided, and as many times as there are bins to choose the smallest from (Bonferroni).
-    limit = float(scipy("stats").t.ppf(1.0 - (1.0 - LEVEL) / len(others), degrees))
+    limit = float(scipy("special").stdtrit(degrees, 1.0 - (1.0 - LEVEL) / len(others)))
     name, method = f"stribeck.{direction}", f"friction map, {len(bins)} bins"
     return Dip(
         direction, depth > limit * error, estimate(name, depth, unit, error, method, degrees), float(least.speed)

@@ -10,6 +10,7 @@ scatter between the periods is its noise (R. Pintelon, J. Schoukens, "System Ide
 Approach", 2nd ed., Wiley 2012, chapter 2): nothing leaks, and noise that a loop feeds back averages out as well.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
-from detent.logs.differences import scipy
+from detent.logs.differences import products_of, scipy
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
 
@@ -38,6 +39,11 @@ _APART = 0.5
 _AS_GOOD = 0.02
 _EVEN = 1e-6
 _BETTER = 1.05
+
+COHERENT = 0.8  # coherence of a line that tells something
+FEWEST_COHERENT = 10  # coherent lines without which there is no Bode plot
+AGREEING = 0.9  # share of neighbouring lines whose accelerations are less than a factor of 2 apart, at least
+BROADEST = 3.0  # highest over lowest coherent frequency, at least
 
 Complex = NDArray[np.complex128]
 
@@ -91,7 +97,7 @@ def find_period(values: Values) -> float | None:
 def autocorrelation(values: Values) -> Values:
     """Correlation of a signal with itself, some rows later, over the part in which the two overlap."""
     centred = values - values.mean()
-    products = np.asarray(scipy("signal").correlate(centred, centred, mode="full", method="fft"))[len(values) - 1 :]
+    products = products_of(centred, centred)[len(values) - 1 :]
     sums = np.r_[0.0, np.cumsum(centred**2)]
     early, late = sums[len(values) : 0 : -1], sums[-1] - sums[: len(values)]
     # The sums of the last rows are rounding: what is compared there says nothing.
@@ -276,6 +282,8 @@ def measure_response(t: Values, excitation: Values, answer: Values) -> Frequency
             "without missing rows"
         )
     t, excitation, answer = t[part], excitation[part], answer[part]
+    if not np.ptp(answer) > 0.0:
+        raise DetentError("identify: got a position that does not change; expected: motion; record one")
     periods = cut_periods(t, excitation, [answer])
     is_periodic = periods is not None and len(periods.signals[0]) >= FEWEST
     return average_periods(periods) if periods and is_periodic else average_windows(t, excitation, answer)
@@ -317,3 +325,21 @@ def average_windows(t: Values, excitation: Values, answer: Values, step_hz: floa
     frequency, response = np.asarray(frequency[chosen], dtype=np.float64), np.asarray(cross[chosen] / power[chosen])
     deviation, width = response_deviation(coherence, averages), 1.5 / (rows * mean)
     return FrequencyResponse(frequency, response, np.minimum(coherence, 1.0), deviation, averages, width, said)
+
+
+def told_response(log: Log, effort: str, *, is_open: bool) -> FrequencyResponse | None:
+    """Response of a log, where it tells one: periods, or an open loop, and enough coherent lines."""
+    # Windows over a closed loop show the controller where noise drives the effort.
+    try:
+        response = response_of(log, effort)
+    except DetentError:
+        return None
+    told = response.coherence >= COHERENT
+    f, size = response.frequency[told], np.abs(response.response[told])
+    is_open = response.resolution == 0.0 or is_open
+    if not is_open or len(f) < FEWEST_COHERENT or f[-1] < BROADEST * f[0]:
+        return None
+    # Lines hardly excited beside strong ones hold what friction makes of these, which coherence does not show: there
+    # neighbours do not agree.
+    apart = np.abs(np.diff(np.log(size * f**2)))
+    return response if float(np.mean(apart < math.log(2.0))) > AGREEING else None

@@ -134,7 +134,7 @@ def _is_no_better(fit: response_fit.Fit, rigid: response_fit.Fit, lines: respons
     more = len(fit.parameters) - len(rigid.parameters)
     gain = (squares(rigid) - squares(fit)) / more
     ratio = gain / (squares(fit) / fit.freedom)
-    if float(scipy("stats").f.sf(ratio, more, fit.freedom)) > NO_BETTER:
+    if float(scipy("special").fdtrc(more, fit.freedom, ratio)) > NO_BETTER:
         rigid_too = f"one rigid mass explains the response as well as two (F = {ratio:.2g})"
         band = f"{lines.frequency[0]:.4g} to {lines.frequency[-1]:.4g} Hz"
         advice = "excite higher frequencies, or treat the axis as rigid"

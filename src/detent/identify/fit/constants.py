@@ -64,7 +64,7 @@ class Constants:
     @property
     def correlation(self) -> Values:
         """Correlation of the errors, shape (k, k)."""
-        error = np.maximum(self.errors, 1e-300)
+        error = np.maximum(self.errors, 1e-150)
         return np.clip(self.covariance / np.outer(error, error), -1.0, 1.0)
 
     def inseparable(self) -> tuple[tuple[str, str, float], ...]:
@@ -76,9 +76,10 @@ class Constants:
     def estimates(self, run: Run) -> tuple[Estimate, ...]:
         """Each with its interval, in the units of a run."""
         # Without a reference the delay is none of them: in a loop it hides in the answer of the effort to the noise.
+        # What a search left at an end of its range has no limits: those of the residuals say how sharp the end is.
         told = zip(self.names, self.values.tolist(), self.errors.tolist(), self.degrees.tolist(), strict=True)
         return tuple(
-            estimate(name, value, run.unit(name), error, self.method, degrees)
+            estimate(name, value, run.unit(name), np.inf if name in self.bounded else error, self.method, degrees)
             for name, value, error, degrees in told
             if name != "delay" or self.delay_is_told
         )
@@ -95,7 +96,8 @@ def constants_of(fit: Fit, rivals: Sequence[Fit] = ()) -> Constants:
         squares += np.array([(known.get(n, v) - v) ** 2 for n, v in zip(names, values.tolist(), strict=True)])
     if rivals:
         covariance = covariance + np.diag(squares / len(rivals))
-    return Constants(names, values, covariance, degrees, METHODS[fit.instruments], fit.instruments == "reference")
+    is_told, bounded = fit.instruments == "reference", () if fit.is_settled else ("delay",)
+    return Constants(names, values, covariance, degrees, METHODS[fit.instruments], is_told, bounded)
 
 
 def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Values, Values, Values]:

@@ -37,6 +37,7 @@ _SHAPE = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** 4
 FINE, FINEST = 6e-3, 4  # half of the window that tells the direction [s], and its fewest samples
 NOISES = 5.0  # velocity that is told from standstill, in standard deviations of its noise
 HOPS = 2  # rows per half window
+LOST = 50.0  # exponent of the low-speed friction from which on it is left as it is: nothing
 BESIDE = 4  # ways before and behind a jump that tell the usual one
 LOSS = "loss"  # named in a model whose transmission loses a share of the effort; it bends the terms, without a column
 
@@ -298,7 +299,9 @@ Term = Callable[[Motion, float], Values]
 def _bristle(m: Motion, stribeck: float, sense: int) -> Values:
     """Part of the low-speed friction that is left at each sample, in one direction."""
     speed = m.quick * sense
-    left = np.where(speed > 0.0, np.exp(-np.minimum((speed / stribeck) ** 2, 50.0)), 0.0)
+    left = np.where(speed > 0.0, np.exp(-LOST), 0.0)
+    slow = np.flatnonzero((speed > 0.0) & (speed < 1.01 * math.sqrt(LOST) * stribeck))
+    left[slow] = np.exp(-np.minimum((speed[slow] / stribeck) ** 2, LOST))
     return sense * m.kernel.mean(left, m.rows)
 
 

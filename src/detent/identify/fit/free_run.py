@@ -9,14 +9,14 @@ first part. Loops hide errors of constants in the position, and show them in the
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants, hanging_position
 from detent.identify.fit.equations import Run, fine_kernel, make_kernel
-from detent.identify.fit.estimate import rms, significant
+from detent.identify.fit.estimate import quantile, rms, significant
 from detent.identify.fit.loop_fit import Loops, fit_loops
 from detent.kernel.loop import advance
 from detent.logs.log import Values
@@ -28,6 +28,8 @@ from detent.sensing.position_sensor import MEMORY
 
 HORIZONS = (0.1, 0.5, 1.0, 2.0)  # lengths of simulated stretches [s]
 SUBSTEPS = 4  # ticks of the plant per sample of the log
+NUDGED = 0.05  # change of a constant for what it does to a free run, in its value, at most
+FARTHEST = 10.0  # spread of a free run, in the way that it makes, from which on nothing is said of it
 MOST_STARTS = 60  # stretches simulated per horizon at most, evenly spread over the log
 _LOOP_PICKS = byte_places(choose_leaves(cascade.Cascade, ["plant.machine.motor.position", "controller.law.command"]))
 _PICKS = byte_places(choose_leaves(cascade.Cascade, ["plant.machine.motor.position"]))
@@ -46,6 +48,9 @@ class Horizon:
     largest: float
     moved: float  # root mean square of the way the axis made in these stretches, which 0 would be wrong by
     naive: float  # error of going on with the velocity of the start: what no model needs to know
+    # of the free run: half of the 95 % interval that the limits of the constants alone leave its position, rms over its
+    # length; nan for stretches, and where the limits leave nothing to be said
+    spread: float = math.nan
 
 
 class Plant:
@@ -107,10 +112,10 @@ def start_velocities(run: Run) -> Values:
 
 
 def simulate_horizons(constants: Constants, runs: Sequence[Run], report: Report = untold) -> tuple[Horizon, ...]:
-    """Errors over a sample, over each of `HORIZONS`, and to the end."""
+    """Errors over each of `HORIZONS`, over a sample, and to the end."""
     found: list[Horizon] = []
     step = runs[0].step
-    named = [(1, "one step"), *((round(h / step), f"{h:g} s") for h in HORIZONS)]
+    named = [*((round(h / step), f"{h:g} s") for h in HORIZONS), (1, "one step")]
     for k, (samples, name) in enumerate(named):
         if samples < 1 or (samples == 1 and name != "one step"):
             continue
@@ -151,7 +156,43 @@ def _free_run(constants: Constants, runs: Sequence[Run]) -> Horizon:
         cut = run.part(well_known_from(run), len(run.position))
         q = cut.position
         rows.append(np.column_stack([free_run(constants, run) - q, q - q[0], q[0] + velocity * cut.t - q]))
-    return _horizon("free run", max(run.t[-1] for run in runs), len(runs), np.concatenate(rows))
+    found = _horizon("free run", max(run.t[-1] for run in runs), len(runs), np.concatenate(rows))
+    return replace(found, spread=free_spread(constants, runs))
+
+
+def free_spread(constants: Constants, runs: Sequence[Run]) -> float:
+    """Half of the 95 % interval that the errors of the constants leave a free run, rms over it; nan beyond `FARTHEST`.
+
+    To first order: the free run is simulated once more with each constant a little off, and what that changes is added
+    up by the covariance. No start, and nothing that the model lacks, is part of it.
+    """
+    errors, found, way = constants.errors, list[Values](), 0.0
+    for run in runs:
+        middle = free_run(constants, run)
+        way = max(way, float(np.ptp(middle)))
+        changes = np.array([_change(constants, k, run) - middle for k in range(len(errors))])
+        nudges = np.array([_nudge(constants, k, run.step) for k in range(len(errors))])
+        changes *= np.where(errors > 0.0, errors / nudges, 0.0)[:, None]
+        # In one order on every processor.
+        found.append(sum((row * (constants.correlation[k][:, None] * changes).sum(axis=0))
+                         for k, row in enumerate(changes)))  # fmt: skip
+    spread = quantile(float(constants.degrees.min())) * math.sqrt(max(float(np.mean(np.concatenate(found))), 0.0))
+    return spread if spread < FARTHEST * way else math.nan
+
+
+def _nudge(constants: Constants, k: int, step: float) -> float:
+    """By how much a constant is changed for what it does: its error, a twentieth of it at most; a delay by a tick."""
+    if constants.names[k] == "delay":
+        return max(float(constants.errors[k]), step)
+    value = abs(float(constants.values[k]))
+    return significant(min(float(constants.errors[k]), NUDGED * value) or NUDGED * value or 1.0)
+
+
+def _change(constants: Constants, k: int, run: Run) -> Values:
+    """The free run with a constant a little larger."""
+    values = constants.values.copy()
+    values[k] = significant(values[k] + _nudge(constants, k, run.step))
+    return free_run(replace(constants, values=values), run)
 
 
 def well_known_from(run: Run) -> int:

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from detent.errors import InputError
+from detent.errors import DetentError, InputError
 from detent.files.screen import OnScreen
 from detent.identify.fit import untold
 from detent.identify.fit.constants import Constants, constants_of
@@ -30,6 +30,9 @@ from detent.identify.fit.output_error import STRETCH, fit_output_error
 from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
 from detent.identify.fit.steadiness import changes_of, widen
 from detent.identify.fit.verdict import (
+    BETTER_MISSED,
+    FAR_OFF,
+    WELL_MET,
     Refusal,
     compare_methods,
     look_at_constants,
@@ -37,11 +40,12 @@ from detent.identify.fit.verdict import (
     look_at_log,
     look_at_motion,
     look_at_prediction,
+    missed,
 )
 from detent.logs.log import Log
 
 Report = Callable[[str, float], None]
-Method = Literal["regression", "output error"]
+Method = Literal["auto", "regression", "output error"]
 Verdict = Literal["trusted", "partly trusted", "refused"]
 
 WINDOW = 0.02  # half of the window to begin with [s]
@@ -110,6 +114,11 @@ class Identification(OnScreen):
         return "refused" if any(not r.constants for r in self.refusals) or not self.trusted else "partly trusted"
 
     @property
+    def bounded(self) -> tuple[str, ...]:
+        """Constants that a search left at an end of its range: no values, so without limits."""
+        return () if self.constants is None else self.constants.bounded
+
+    @property
     def residuals(self) -> Residuals | None:
         """What the residuals of the regression look like."""
         return None if self.fit is None else residuals_of(self.fit)
@@ -150,12 +159,12 @@ class Identification(OnScreen):
 
 
 def identify(
-    logs: Sequence[Log], effort: str | None = None, *, method: Method = "regression", report: Report = untold
+    logs: Sequence[Log], effort: str | None = None, *, method: Method = "auto", report: Report = untold
 ) -> Identification:
     """Identify an axis from recorded runs."""
     runs = tuple(make_run(log, effort) for log in logs)
     _check_alike(runs)
-    refusals = [r for log, run in zip(logs, runs, strict=True) for r in look_at_log(log, run)]
+    refusals = [r for log, run in zip(logs, runs, strict=True) for r in look_at_log(log, run, runs)]
     parts = choose_windows(runs)
     refusals += look_at_motion(runs, parts)
     windows = sum(len(p.motion.rows) for p in parts)
@@ -167,26 +176,78 @@ def identify(
     changes = changes_of(parts, fit)
     widen(fit, changes)
     constants = constants_of(fit, rivals)
-    regressed, is_refined = constants, method == "output error" and constants.value("mass") > 0.0
-    if is_refined:
-        constants = _refine(runs, constants, "output error", report)
-    refusals += look_at_constants(runs[0], constants, parts)
     refusals += look_at_fit(parts, fit, chosen_climb(climbs).error, changes)
-    seen, horizons, closed = None, (), None
+    tested = _Tested(constants)
     if constants.value("mass") > 0.0:
-        seen, horizons, closed = _test_simulation(runs, fit, chosen_rung(climbs), method, report)
-    believed = ""
-    if is_refined and seen is not None:
-        _, others, _ = _test_simulation(runs, fit, chosen_rung(climbs), "regression", report)
-        believed, told = compare_methods(runs[0], (regressed, constants), (others, horizons))
-        refusals += told
-    refusals += [*look_at_prediction(climbs, horizons, refusals)]
+        tested = _simulated(runs, constants, fit, chosen_rung(climbs), method, report)
+    refusals += tested.disagreement
+    judged = _judge(runs, parts, climbs, tested, refusals)
+    if method == "auto" and [r.subject for r in judged if not r.constants] == [FAR_OFF]:
+        tested = _other_way(runs, tested, fit, chosen_rung(climbs), report)
+        judged = _judge(runs, parts, climbs, tested, refusals)
+    constants, horizons = tested.constants, tested.horizons
     kernel, told = parts[0].motion.kernel, f"{runs[0].effort_name} [{runs[0].effort_unit}]"
     width = 2e3 * kernel.half * kernel.step
     notes = (f"effort: {told}", f"windows of {width:.3g} ms, {windows} of them", _WAYS[parts[0].instruments])
-    notes += (believed,) if believed else ()
-    results = (constants, constants.estimates(runs[0]), climbs, fit, horizons, tuple(refusals), seen, closed, notes)
+    notes += (tested.believed,) if tested.believed else ()
+    if not tested.believed and method != "output error" and (miss := missed(horizons)) > WELL_MET:
+        notes += (f"held-out travel is missed by {miss:.0%}: --method output-error may predict it better",)
+    estimates = constants.estimates(runs[0])
+    results = (constants, estimates, climbs, fit, horizons, tuple(judged), tested.seen, tested.closed, notes)
     return Identification(tuple(logs), runs, *results)
+
+
+class _Tested(NamedTuple):
+    """Constants, with what became of their simulation on the held-out part, and what two ways to them say."""
+
+    constants: Constants
+    seen: Constants | None = None
+    horizons: tuple[Horizon, ...] = ()
+    closed: ClosedLoop | None = None
+    believed: str = ""
+    disagreement: tuple[Refusal, ...] = ()
+
+
+def _judge(
+    runs: Sequence[Run],
+    parts: Sequence[Prepared],
+    climbs: Sequence[Climb],
+    tested: _Tested,
+    refusals: Sequence[Refusal],
+) -> list[Refusal]:
+    """What is refused, with what constants and their simulation add to it."""
+    found = [*refusals, *look_at_constants(runs[0], tested.constants, parts)]
+    return [*found, *look_at_prediction(climbs, tested.horizons, found)]
+
+
+def _simulated(  # noqa: PLR0913 - all that a simulation consists of
+    runs: Sequence[Run], constants: Constants, fit: Fit, rung: Rung, method: Method, report: Report
+) -> _Tested:
+    """Constants tested on the held-out part; by simulation, where that is asked for, and against the regression."""
+    if method != "output error":
+        return _Tested(constants, *_test_simulation(runs, fit, rung, method, report))
+    refined = _refine(runs, constants, "output error", report)
+    seen, horizons, closed = _test_simulation(runs, fit, rung, method, report)
+    if seen is None:
+        return _Tested(refined)
+    _, others, _ = _test_simulation(runs, fit, rung, "regression", report)
+    believed, told = compare_methods(runs[0], (constants, refined), (others, horizons))
+    return _Tested(refined, seen, horizons, closed, believed, tuple(told))
+
+
+def _other_way(runs: Sequence[Run], tested: _Tested, fit: Fit, rung: Rung, report: Report) -> _Tested:
+    """The simulation fit, where the regression alone does not predict the motion: the better of the two, and why."""
+    # Axes that stick, lose force in a gear, or have a coarse encoder: the regression sees little of what holds them.
+    try:
+        refined = _refine(runs, tested.constants, "output error", report)
+        seen, horizons, closed = _test_simulation(runs, fit, rung, "output error", report)
+    except DetentError:  # too short for its stretches
+        return tested
+    other, by = missed(tested.horizons), missed(horizons)
+    told = f"the regression misses held-out travel by {other:.0%}, the simulation fit by {by:.0%}"
+    if seen is not None and 0.0 < by < min(BETTER_MISSED * other, WELL_MET):
+        return _Tested(refined, seen, horizons, closed, f"{told}: constants of the simulation fit")
+    return tested._replace(believed=f"{told}: neither is believed")
 
 
 def _check_alike(runs: Sequence[Run]) -> None:

@@ -12,13 +12,14 @@ Burman, Chow, Nolan: A cross-validatory method for dependent data. Biometrika 81
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.identify.fit import Report, regression, untold
 from detent.identify.fit.equations import LOSS, is_bent, terms_of
-from detent.logs.differences import scipy
+from detent.identify.fit.search import least_within, root_within
 from detent.logs.log import Values
 
 STRETCHES = 8  # parts of a log that are held out one after the other
@@ -95,7 +96,7 @@ def best_bend(parts: Sequence[regression.Prepared], names: Sequence[str]) -> tup
     # logs with low-speed friction, those around what the instruments say in 93 to 96 %.
     tried = bends_tried(parts, names)
     plain = [name for name in terms_of(names) if not name.startswith("excess")]
-    effort = regression.make_effort(parts, regression.fit_equations(parts, plain).value("delay"))
+    effort = regression.make_effort(parts, regression.solve_equations(parts, plain).late)
 
     def miss(bend: float) -> float:
         """Sum of the squared residuals."""
@@ -105,8 +106,7 @@ def best_bend(parts: Sequence[regression.Prepared], names: Sequence[str]) -> tup
 
     best = int(np.argmin([miss(float(bend)) for bend in tried]))
     around = tried[[max(best - 1, 0), min(best + 1, len(tried) - 1)]]
-    limits = {"xatol": 1e-4 * float(around[1])}
-    found = float(scipy("optimize").minimize_scalar(miss, bounds=tuple(around), method="bounded", options=limits).x)
+    found = least_within(miss, *around.tolist(), accuracy=1e-4 * float(around[1]))
     return _refined_bend(parts, names, found, tried), found
 
 
@@ -114,9 +114,10 @@ def _refined_bend(parts: Sequence[regression.Prepared], names: Sequence[str], st
     """The bend at which the instruments ask for no other; the start where there is none within the range tried."""
     # What they ask for changes sign there: a bracket around it ends at one place, wherever it began.
 
+    @cache
     def asked(bend: float) -> float:
         """What the instruments want the bend changed by."""
-        return regression.bend_correction(parts, regression.fit_equations(parts, names, bend))
+        return regression.bend_correction(parts, names, bend)
 
     near = start
     wanted = asked(near)
@@ -126,7 +127,7 @@ def _refined_bend(parts: Sequence[regression.Prepared], names: Sequence[str], st
             return start
         other = asked(far)
         if (other > 0.0) != (wanted > 0.0):
-            return float(scipy("optimize").brentq(asked, near, far, xtol=1e-4 * start))
+            return root_within(asked, near, far, 1e-4 * start)
         near, wanted = far, other
     return start
 

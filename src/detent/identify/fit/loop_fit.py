@@ -20,7 +20,8 @@ import numpy as np
 
 from detent.identify.fit.equations import Run
 from detent.identify.fit.estimate import rms, significant
-from detent.logs.differences import scipy
+from detent.identify.fit.search import least_within
+from detent.logs.differences import MOST_ROWS
 from detent.logs.log import Values
 
 SPANS = (1, 2, 3, 4, 6, 8, 12)  # samples that the velocity may be a difference over
@@ -61,11 +62,12 @@ def _trials(run: Run, reference: Values) -> Iterator["_Trial"]:
     """Every structure that is tried, the simplest first."""
     step, count = run.step, len(reference)
     velocity = np.gradient(reference, step)
-    feeds = np.column_stack([np.gradient(velocity, step), velocity, np.sign(velocity), np.ones(count)])
     rows = np.flatnonzero(run.usable)
     rows = rows[(rows >= max(SPANS) + 3) & (rows < count - 3)]
+    rows = rows[:: max(1, len(rows) // MOST_ROWS)]
     if len(rows) < 10 * max(SPANS):
         return
+    feeds = [series[rows] for series in (np.gradient(velocity, step), velocity, np.sign(velocity), np.ones(count))]
     for span in SPANS:
         moved = np.zeros(count)
         moved[span:] = (run.position[span:] - run.position[:-span]) / (span * step)
@@ -73,7 +75,8 @@ def _trials(run: Run, reference: Values) -> Iterator["_Trial"]:
         for share, loops in ((0.0, 1), (0.0, 2), (1.0, 2)):
             pair = [reference - run.position, share * velocity - moved]
             integrals = [np.cumsum(signal) * step for signal in pair] if loops == 2 else []
-            yield _Trial(np.column_stack([*pair, *integrals, feeds])[rows], run.effort[rows], span, share, loops)
+            told = [signal[rows] for signal in (*pair, *integrals)]
+            yield _Trial(np.column_stack([*told, *feeds]), run.effort[rows], span, share, loops)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,7 +134,7 @@ class _Trial:
         grid: list[float] = np.linspace(math.log(GAINS[0]), math.log(GAINS[1]), 9).tolist()
         best = int(np.argmin([miss(g) for g in grid]))
         around = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-        found = float(scipy("optimize").minimize_scalar(miss, bounds=around, method="bounded").x)
+        found = least_within(miss, *around)
         # Near its least the error is flat, and rounding decides where the search ends: its slope tells the place.
         for _ in range(2):
             less, least, more = miss(found - REACH), miss(found), miss(found + REACH)

@@ -160,7 +160,7 @@ class _Search:
         covariance = np.pad(covariance, ((0, 1), (0, 1)))
         covariance[-1, -1] = self._start.errors[self._start.names.index("delay")] ** 2
         freedom = np.full(len(covariance), float(degrees))
-        told, bounded = self._start.delay_is_told, self._at_bounds(x)
+        told, bounded = self._start.delay_is_told, (*self._at_bounds(x), *self._start.bounded)
         found = self._constants(x)
         return replace(found, covariance=covariance, degrees=freedom, delay_is_told=told, bounded=bounded)
 

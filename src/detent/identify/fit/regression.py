@@ -13,7 +13,7 @@ windows take its place: those 2.5 times as wide hold 2.6 % of the white noise in
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -135,8 +135,21 @@ def make_effort(parts: Sequence[Prepared], delay: float) -> Values:
     return np.concatenate([p.motion.kernel.held(p.run.effort, p.motion.rows, delay / p.run.step) for p in parts])
 
 
-def fit_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float = 1.0) -> Fit:
-    """Fit a model to runs; `bend` is the Stribeck velocity [m/s] or the share lost, where the model has one."""
+class Solved(NamedTuple):
+    """The equations of a model solved, and what they consist of."""
+
+    theta: Values  # constants of the terms that have a column
+    late: float  # delay of the effort [s]
+    is_settled: bool  # False where no delay was found at which the effort asks for no other
+    effort: Values  # over all windows, by that delay
+    columns: Values  # of the terms, and what the instruments say of them
+    ideal: Values
+    x: Values  # the same with that of the delay
+    z: Values
+
+
+def solve_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float = 1.0) -> Solved:
+    """Constants and delay of a model at a bend; no errors of these."""
     columns = make_columns(parts, names, bend)
     ideal = make_columns(parts, names, bend, ideal=True) if parts[0].instruments != "none" else columns
     late, step, is_settled = 0.0, parts[0].run.step, False
@@ -153,6 +166,12 @@ def fit_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float =
         late += moved
         y = make_effort(parts, late)
         x, z = _with_delay(parts, names, theta, late, columns, ideal)
+    return Solved(theta, late, is_settled, y, columns, ideal, x, z)
+
+
+def fit_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float = 1.0) -> Fit:
+    """Fit a model to runs; `bend` is the Stribeck velocity [m/s] or the share lost, where the model has one."""
+    theta, late, is_settled, y, columns, _, x, z = solve_equations(parts, names, bend)
     residual = y - combine(columns, theta)
     x, z = _with_bend(parts, names, theta, bend, x, z)
     covariance, cosines = coloured_covariance(x, residual, z)
@@ -206,12 +225,11 @@ def _with_bend(  # noqa: PLR0913 - all that a model consists of
     return np.column_stack([x, slopes[0]]), np.column_stack([z, slopes[1]])
 
 
-def bend_correction(parts: Sequence[Prepared], fit: Fit) -> float:
-    """By how much the bend misses what the instruments say of it, to first order."""
-    names, theta, bend = fit.model, fit.values[: len(equations.terms_of(fit.model))], fit.bend
-    columns, tools = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
-    x, z = _with_bend(parts, names, theta, bend, columns, tools)
-    return float(solve(z, x, fit.residual)[-1])
+def bend_correction(parts: Sequence[Prepared], names: Sequence[str], bend: float) -> float:
+    """By how much a bend misses what the instruments say of it, to first order."""
+    found = solve_equations(parts, names, bend)
+    x, z = _with_bend(parts, names, found.theta, bend, found.columns, found.ideal)
+    return float(solve(z, x, found.effort - combine(found.columns, found.theta))[-1])
 
 
 def solve(instruments: Values, columns: Values, effort: Values) -> Values:

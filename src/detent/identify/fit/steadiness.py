@@ -57,7 +57,7 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
             degrees = float(carried_degrees(columns, residual, tools, cosines)[-1])
             amplitude, error = float(values[-1]), float(np.sqrt(max(covariance[-1, -1], 0.0)))
             own = quantile(float(fit.degrees[k])) * float(np.sqrt(max(fit.covariance[k, k], 0.0)))
-            least = float(scipy("stats").t.isf(CHANCE, max(degrees, 1.0)))
+            least = -float(scipy("special").stdtrit(max(degrees, 1.0), CHANCE))
             clear = abs(amplitude) / max(error * least, 1e-300)
             size = abs(amplitude) * rms(x[:, k]) / max(rms(effort), 1e-300)
             share = abs(amplitude / float(values[k])) if name == "mass" and values[k] else size

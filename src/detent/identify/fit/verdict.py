@@ -14,6 +14,7 @@ from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb, chosen_climb
 from detent.identify.fit.regression import Fit, Prepared, make_effort, residuals_of
 from detent.identify.fit.steadiness import SLIGHT, Change
+from detent.logs.differences import stepped
 from detent.logs.log import Action, Kind, Log, Severity, Values
 
 LEAST_MOTION = 1.0  # time in which the axis really moves [s], at least
@@ -32,6 +33,8 @@ UNTOLD = 0.06  # residual in this distance from which it does: a command that is
 LASTING = 0.9  # correlation of neighbouring residuals from which the model misses something that lasts
 WORST_LASTING = 0.05  # error of the prediction from which that matters
 WORST_MISSED, WORST_FREE = 0.4, 0.8  # error of simulations over the travel: of half a second and more; of the free run
+FAR_OFF = "simulation is far off"
+WELL_MET = 0.2  # the same up to which constants of the simulation fit are taken where the regression's are far off
 BETTER_MISSED = 0.7  # such an error in that of another way to the constants, up to which it is the better one
 WORST_PREDICTION = 0.35  # error of the prediction of held-out segments over the effort, at most
 WORST_SIMULATION = 0.7  # simulated error over that of going on with the velocity of the start, at most
@@ -78,8 +81,8 @@ class Refusal:
         return asdict(self)
 
 
-def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:
-    """What is wrong with a log before anything is fitted."""
+def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusal]:
+    """What is wrong with a log before anything is fitted; `runs` are those of all logs that are identified with it."""
     for finding in log.findings:
         is_clock = finding.kind is Kind.DROPPED_ROWS  # rows whose gap the time shows are only left out
         least = (Severity.ERROR,) if is_clock else (Severity.ERROR, Severity.WARNING)
@@ -98,12 +101,19 @@ def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:
     if behind > MOST_LEFT_BEHIND:
         text = f"{log.name}: the reference covers {behind:.0%} of its travel while the position does not change"
         yield Refusal("stuck signal", text, "check the encoder, its cable and the drive enable, and record again")
-    top, bottom = run.effort.max(), run.effort.min()
-    at_ends = np.count_nonzero((run.effort == top) | (run.effort == bottom)) / len(run.effort)
-    saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), at_ends)
+    saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), _share_at_ends(run, runs))
     if saturated > MOST_SATURATED:
         text = f"{log.name}: {run.effort_name} or position is at its limit in {saturated:.0%} of the rows"
         yield Refusal("saturated", text, "record slower or smaller moves that stay within the limit")
+
+
+def _share_at_ends(run: Run, runs: Sequence[Run]) -> float:
+    """Share of the samples whose effort is at its largest or smallest value, and was not put there by a step."""
+    efforts = [one.effort for one in runs] or [run.effort]
+    top, bottom = max(float(effort.max()) for effort in efforts), min(float(effort.min()) for effort in efforts)
+    ends = [run.effort == end for end in {top, bottom}]
+    cut = [end & ~stepped(run.effort, end, top - bottom, is_part=len(efforts) > 1) for end in ends]
+    return float(np.mean(np.logical_or.reduce(cut)))
 
 
 def _share_left_behind(run: Run) -> float:
@@ -141,7 +151,7 @@ def look_at_constants(run: Run, constants: Constants, parts: Sequence[Prepared])
     velocity = np.concatenate([p.motion.velocity for p in parts])
     top = float(np.quantile(np.abs(velocity), 0.95))
     by_name = {e.name: e for e in constants.estimates(run)}
-    found = [*_not_told(run, by_name, effort, top)]
+    found = [*_not_told(run, by_name, effort, top, constants.bounded)]
     refused = {name for refusal in found for name in refusal.constants}
     found += [r for r in _one_speed(run, velocity, by_name) if not refused >= set(r.constants)]
     found += [_bounded(by_name[name]) for name in constants.bounded if name in by_name]
@@ -151,19 +161,22 @@ def look_at_constants(run: Run, constants: Constants, parts: Sequence[Prepared])
 def _bounded(e: Estimate) -> Refusal:
     """A constant at an end of the range that was searched for it."""
     text = f"{e.name} {e.value:.4g} {e.unit} is an end of the range that was searched, not a value"
-    return Refusal("at a bound", text, "record moves that show it, or take the constants of the regression", (e.name,))
+    record = "moves that show it" if e.name != "delay" else "effort and motion by one clock, unfiltered"
+    return Refusal("at a bound", text, f"record {record}", (e.name,))
 
 
-def _not_told(run: Run, by_name: dict[str, Estimate], effort: float, top: float) -> Iterator[Refusal]:
-    """Constants that are not known well enough."""
+def _not_told(
+    run: Run, by_name: dict[str, Estimate], effort: float, top: float, bounded: Collection[str]
+) -> Iterator[Refusal]:
+    """Constants that are not known well enough; those at an end of what was searched are told as such."""
     mass, delay = by_name["mass"], by_name.get("delay")
     if mass.high <= 0.0:
         text = f"the mass is {mass.value:.4g} {mass.unit}: effort and motion have opposite signs"
         yield Refusal("wrong sign", text, "invert the effort or the position in the mapping")
-    elif not mass.half < WIDEST_MASS * mass.value:
+    elif "mass" not in bounded and not mass.half < WIDEST_MASS * mass.value:
         text = f"mass {mass.value:.4g} +- {mass.half:.2g} {mass.unit}, because there is hardly any acceleration"
         yield Refusal("little acceleration", text, "record moves with short ramps", ("mass",))
-    for e in (by_name[name] for name in FORCES if name in by_name):
+    for e in (by_name[name] for name in FORCES if name in by_name and name not in bounded):
         is_viscous = e.name.startswith("viscous")
         scale = top if is_viscous else 1.0
         if not e.half * scale < WIDEST_FORCE * effort:
@@ -171,7 +184,7 @@ def _not_told(run: Run, by_name: dict[str, Estimate], effort: float, top: float)
             text = f"{e.name} {f'{e.value:.4g} +- {e.half:.2g} {e.unit}' if is_known else 'not determined at all'}"
             record = "steady moves at several speeds" if is_viscous else "slow moves in both directions"
             yield Refusal("not determined by the data", text, f"record {record}", (e.name,))
-    if delay is not None and delay.half > WIDEST_DELAY * run.step:
+    if delay is not None and "delay" not in bounded and delay.half > WIDEST_DELAY * run.step:
         text = f"delay {1e3 * delay.value:.3g} +- {1e3 * delay.half:.2g} ms"
         yield Refusal("not determined by the data", text, "record moves with short ramps, sampled faster", ("delay",))
 
@@ -244,7 +257,9 @@ def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequ
 
 
 def level_of(effort: Values) -> float:
-    """Distance of the values of an effort from the nearest other value, the root mean square over the samples."""
+    """Distance of the values that an effort goes to from the nearest other value, the root mean square over these."""
+    # A value that it keeps counts once: a command that is stepped is exact, however far its steps are.
+    effort = effort[np.r_[True, np.diff(effort) != 0.0]]
     levels, counts = np.unique(effort, return_counts=True)
     if len(levels) < 2:
         return 0.0
@@ -279,8 +294,8 @@ def _far_off(horizons: Sequence[Horizon]) -> Iterator[Refusal]:
     if off > WORST_MISSED or any(h.rms > WORST_FREE * h.moved for h in free):
         told = ", ".join(f"{h.rms / h.moved:.0%} over {h.name}" for h in _long(horizons))
         text = f"simulated from the effort alone, the axis misses its travel by {told}"
-        record = "fit the simulation itself, --method output-error; or record each direction at several speeds"
-        yield Refusal("simulation is far off", text, record)
+        record = "record each direction at several speeds; behind --method regression, try --method output-error"
+        yield Refusal(FAR_OFF, text, record)
 
 
 def _long(horizons: Sequence[Horizon]) -> list[Horizon]:

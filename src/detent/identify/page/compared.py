@@ -119,12 +119,14 @@ def _horizon_figure(horizons: Sequence[Horizon], ways: Ways) -> Figure:
     heads = [
         ("simulated for", False), ("starts", True), ("simulated, rms", True), ("largest", True),
         ("without a model, rms", True), ("simulated, relative to no model", False), ("travel of the axis, rms", True),
+        ("95 % by the limits of the constants", True),
     ]  # fmt: skip
     caption = Markup(
         "Error at the end of a simulated segment that starts from the recorded state. "
         "<b>Without a model</b> it would continue at its initial velocity: a useful model is far below 100\u202f%. One "
         "step shows little more than encoder noise; the free run is a single segment, and its error is taken "
-        "over all of it."
+        "over all of it. <b>The limits of the constants</b> alone leave the free run this much: an error far beyond it "
+        "is the model's."
     )
     rows: list[list[str]] = []
     for h in horizons:
@@ -132,7 +134,8 @@ def _horizon_figure(horizons: Sequence[Horizon], ways: Ways) -> Figure:
         name = f"free run, {duration(float(h.duration))}" if h.name == "free run" else h.name
         bar = long_bar(share / 1.5, percent(share), chosen=share < 1.0)
         errors = [ways.error(value) for value in (h.rms, h.largest, h.naive)]
-        rows.append([name, count(h.starts), *errors, bar, ways.error(h.moved)])
+        limits = ways.spread(h.spread) if h.name == "free run" else ""
+        rows.append([name, count(h.starts), *errors, bar, ways.error(h.moved), limits])
     return Figure(title="Prediction error versus horizon", caption=caption, table=Table(heads=heads, rows=rows))
 
 

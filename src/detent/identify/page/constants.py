@@ -49,6 +49,8 @@ def _constant_row(found: Identification, e: Estimate, reach: float) -> list[str]
     if meaning := words.meaning_of(e.name):
         name += Markup('<br><small style="color:var(--soft)">{}</small>').format(meaning)
     value = str(words.written(e)) if words.is_known(e) else "not known"
+    if e.name in found.bounded:
+        value = f"an end of the search, {words.written(e).value}{GAP}{words.written(e).unit}"
     share = (
         f"±{GAP}{percent(words.relative_half(e))}"
         if words.is_known(e) and words.relative_half(e) < words.UNKNOWN

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 from markupsafe import Markup
 
-from detent.errors import DetentError
-from detent.identify.analyse.measure_response import FrequencyResponse, response_of
+from detent.identify.analyse.measure_response import COHERENT, FrequencyResponse, told_response
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.identification import Identification
 from detent.identify.page.words import unit_text
@@ -15,16 +14,13 @@ from detent.page.chart import Chart, Curve, Panel, line_chart
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
 
-COHERENT = 0.8  # coherence of a line that tells something
-FEWEST_LINES = 10  # coherent lines without which there is no Bode plot
-AGREEING = 0.9  # share of neighbouring lines whose accelerations are less than a factor of 2 apart, at least
-BROADEST = 3.0  # highest over lowest coherent frequency, at least
 MOST_LINES = 800  # frequencies drawn
 
 
 def response_figures(found: Identification, shown: int) -> list[Figure]:
     """Bode plot with coherence, or a sentence why there is none."""
-    response = told_response(found, shown)
+    run = found.runs[shown]
+    response = told_response(found.logs[shown], run.effort_name, is_open=run.reference is None)
     if response is not None:
         caption = Markup(
             "Response of the position to the effort versus frequency. Where it rises above the dashed line of the "
@@ -40,25 +36,6 @@ def response_figures(found: Identification, shown: int) -> list[Figure]:
         "A multisine or chirp, repeated three times or more, would show resonances.</p>"
     )
     return [Figure(title="Bode plot", drawing=missing)]
-
-
-def told_response(found: Identification, shown: int) -> FrequencyResponse | None:
-    """Response of a log, where it tells one: periods, or an open loop, and enough coherent lines."""
-    # Windows over a closed loop show the controller where noise drives the effort.
-    run = found.runs[shown]
-    try:
-        response = response_of(found.logs[shown], run.effort_name)
-    except DetentError:
-        return None
-    told = response.coherence >= COHERENT
-    f, size = response.frequency[told], np.abs(response.response[told])
-    is_open = response.resolution == 0.0 or run.reference is None
-    if not is_open or len(f) < FEWEST_LINES or f[-1] < BROADEST * f[0]:
-        return None
-    # Lines hardly excited beside strong ones hold what friction makes of these, which coherence does not show: there
-    # neighbours do not agree.
-    apart = np.abs(np.diff(np.log(size * f**2)))
-    return response if float(np.mean(apart < math.log(2.0))) > AGREEING else None
 
 
 def bode_charts(r: FrequencyResponse, constants: Constants | None) -> list[Chart]:

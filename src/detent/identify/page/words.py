@@ -131,6 +131,10 @@ class Ways:
         """Of errors, by the largest of them."""
         return self._units.small(peak) if self._units else self.place
 
+    def spread(self, half: float) -> str:
+        """Write half of the interval that the limits of the constants leave a simulation; nan where they leave all."""
+        return f"±{GAP}{self.error(half)}" if math.isfinite(half) else "not known"
+
     def error(self, value: float) -> str:
         """Write an error with its unit."""
         return self._units.error(value) if self._units else f"{number(value)}{GAP}{self.place.name}"

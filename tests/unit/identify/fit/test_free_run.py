@@ -8,7 +8,7 @@ from tests.trust.plants import Axis, make_params, record
 
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.equations import Run
-from detent.identify.fit.free_run import HORIZONS, Plant, free_run, simulate_horizons, start_velocities
+from detent.identify.fit.free_run import HORIZONS, Plant, free_run, free_spread, simulate_horizons, start_velocities
 from detent.planning.profile import profile_of_recording
 
 pytestmark = pytest.mark.compiled
@@ -76,26 +76,26 @@ def test_a_stretch_starts_where_and_as_fast_as_it_is_told(run):
 def test_horizons_that_fit_in_order(run):
     told = []
     found = simulate_horizons(constants(), [run], told.append)
-    assert [h.name for h in found] == ["one step", "0.1 s", "0.5 s", "1 s", "2 s", "free run"]
-    assert [h.duration for h in found[:-1]] == pytest.approx([STEP, *HORIZONS])
+    assert [h.name for h in found] == ["0.1 s", "0.5 s", "1 s", "2 s", "one step", "free run"]
+    assert [h.duration for h in found[:-1]] == pytest.approx([*HORIZONS, STEP])
     assert all(h.starts == 60 for h in found[:-1])
     assert found[-1].starts == 1
     assert all(h.largest >= h.rms for h in found)
     assert found[-1].rms < COUNT
     assert told == sorted(told)
     short = simulate_horizons(constants(), [run.part(3000, 3700)])
-    assert [h.name for h in short] == ["one step", "0.1 s", "0.5 s", "free run"]
+    assert [h.name for h in short] == ["0.1 s", "0.5 s", "one step", "free run"]
 
 
 @pytest.mark.parametrize("more", range(1, 20))
 def test_a_run_hardly_longer_than_a_horizon(run, more):
     names = [h.name for h in simulate_horizons(constants(), [run.part(1000, 1500 + more)])]
-    assert names[:2] == ["one step", "0.1 s"]
+    assert names[0] == "0.1 s"
     assert names[-1] == "free run"
 
 
 def test_what_the_errors_are_compared_with(run):
-    *_, half, one, two, _ = simulate_horizons(constants(), [run])
+    _, half, one, two, *_ = simulate_horizons(constants(), [run])
     q, v = run.position, start_velocities(run)
     samples = round(half.duration / STEP)
     starts = np.unique(np.linspace(6, len(q) - samples - 6, 60).astype(int))
@@ -104,6 +104,31 @@ def test_what_the_errors_are_compared_with(run):
     assert half.naive == pytest.approx(np.sqrt(np.mean((v[starts] * half.duration - way) ** 2)), rel=1e-6)
     assert half.rms < 0.001 * half.naive
     assert two.naive > one.naive > half.naive
+
+
+def test_the_spread_of_a_free_run_is_that_of_runs_with_constants_drawn_from_their_covariance(run):
+    """Coulomb friction of both directions that errs together makes another spread than the same errors apart."""
+    size = np.array([0.02, 0.02, 0.02, 0.06, 0.05, 0.0])
+    spreads = []
+    for together in (0.0, 0.95):
+        correlation = np.eye(6)
+        correlation[1, 2] = correlation[2, 1] = together
+        covariance = correlation * np.outer(size, size)
+        known = replace(constants(), covariance=covariance, degrees=np.full(6, np.inf))
+        spreads.append(free_spread(known, [run]))
+        rng = np.random.default_rng(4)
+        drawn = rng.multivariate_normal(known.values, covariance, 200)
+        apart = [free_run(replace(known, values=values), run) - free_run(known, run) for values in drawn]
+        # The standard deviation of 200 draws is known to 5 %, that of a correlated course no better.
+        assert spreads[-1] == pytest.approx(1.96 * np.sqrt(np.mean(np.square(apart))), rel=0.12)
+    assert abs(spreads[1] / spreads[0] - 1.0) > 0.05
+    (*stretches, free) = simulate_horizons(known, [run])
+    assert free.spread == spreads[1]
+    assert all(np.isnan(one.spread) for one in stretches)
+
+
+def test_constants_of_which_nothing_is_known_leave_no_spread_to_be_told(run):
+    assert np.isnan(free_spread(replace(constants(), covariance=1e6 * np.eye(6)), [run]))
 
 
 def test_several_runs_count_together(run):

@@ -1,5 +1,8 @@
 """The rules of the verdict, one by one: what is refused, in which words, and what to record instead."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.identify_rig import Recorder, make_log
@@ -162,13 +165,16 @@ GOOD = {
 }
 
 
-def look_at(**changed):
+def constants_with(**changed):
     values = GOOD | {name.replace("_", "."): pair for name, pair in changed.items()}
     errors = np.array([error for _, error in values.values()])
-    found = Constants(
+    return Constants(
         tuple(values), np.array([v for v, _ in values.values()]), np.diag(errors**2), np.full(len(errors), 1e6), ""
     )
-    return look_at_constants(RUN, found, PARTS)
+
+
+def look_at(**changed):
+    return look_at_constants(RUN, constants_with(**changed), PARTS)
 
 
 def test_constants_with_narrow_limits_are_trusted():
@@ -182,6 +188,18 @@ def test_a_delay_with_limits_of_more_than_ten_samples_is_refused_alone():
     assert (found.subject, found.constants) == ("not determined by the data", ("delay",))
     assert found.text == "delay 4 +- 21 ms"
     assert found.record == "record moves with short ramps, sampled faster"
+
+
+@pytest.mark.parametrize("name", ["mass", "coulomb.positive", "viscous.negative", "delay", "loss"])
+def test_a_constant_at_an_end_of_the_search_has_no_limits_and_is_refused_once(name):
+    """However narrow the residuals make it: 1e-6 of its scale, which no other rule would refuse."""
+    found = replace(constants_with(loss=(0.6, 1e-6)), bounded=(name,))
+    by_name = {one.name: one for one in found.estimates(RUN)}
+    assert math.isinf(by_name[name].half)
+    assert all(math.isfinite(one.half) for other, one in by_name.items() if other != name)
+    (refusal,) = look_at_constants(RUN, found, PARTS)
+    assert (refusal.subject, refusal.constants) == ("at a bound", (name,))
+    assert refusal.text.startswith(f"{name} {by_name[name].value:.4g}")
 
 
 def test_a_negative_mass_refuses_everything():

@@ -12,9 +12,9 @@ from tests.places import DATA
 from tests.unit.identify.page.samples import identified, partly, refused, rigid, trusted, unfitted
 
 from detent.errors import DetentError
+from detent.identify.analyse import measure_response as response_module
 from detent.identify.fit.identification import Identification, identify
 from detent.identify.identified import Identified
-from detent.identify.page import response as response_module
 from detent.identify.page.compared import hold_out
 from detent.identify.page.page import identify_page
 from detent.logs.read_log import read_log

@@ -7,14 +7,21 @@ import pytest
 from tests.synthetic_responses import within
 from tests.unit.identify.page.samples import constants, refused, rigid, trusted
 
-from detent.identify.page import response as response_module
-from detent.identify.page.response import bode_charts, respond, response_figures, told_response
+from detent.identify.analyse import measure_response as response_module
+from detent.identify.analyse.measure_response import FrequencyResponse, told_response
+from detent.identify.fit.identification import Identification
+from detent.identify.page.response import bode_charts, respond, response_figures
 
 pytestmark = pytest.mark.compiled
 
 
+def response_told(found: Identification) -> FrequencyResponse | None:
+    run = found.runs[0]
+    return told_response(found.logs[0], run.effort_name, is_open=run.reference is None)
+
+
 def test_moves_in_a_closed_loop_tell_no_response() -> None:
-    assert told_response(trusted(), 0) is None
+    assert response_told(trusted()) is None
 
 
 @pytest.mark.parametrize(
@@ -31,7 +38,7 @@ def test_a_response_is_told_by_coherent_lines_that_agree(
     response: object, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(response_module, "response_of", lambda *_: response)
-    assert (told_response(trusted(), 0) is response) is told
+    assert (response_told(trusted()) is response) is told
 
 
 def test_a_rigid_axis_answers_by_its_mass() -> None:
