@@ -1,4 +1,4 @@
-"""The panel's side of the channel to a live axis, for a program of many tasks."""
+"""A client's side of the channel to a live axis, for a program of many tasks: the panel, and every face."""
 
 import asyncio
 import json
@@ -24,6 +24,7 @@ class Line:
         self._asked: dict[str, asyncio.Future[dict[str, Any]]] = {}
         self._tell: dict[str | int, Tell] = {}  # who wants to hear of an ending: by mark, then by the command's id
         self.gone = asyncio.Event()
+        self.watched: Tell | None = None  # takes the status that comes by itself once it was asked to `watch`
         self._hearing = asyncio.ensure_future(self._hear())
 
     @classmethod
@@ -61,6 +62,8 @@ class Line:
                     self._tell[message["id"]] = self._tell.pop(mark)
                 if "ended" in message and (tell := self._tell.pop(message["ended"]["id"], None)):
                     tell(message)
+                if "status" in message and "as" not in message and self.watched is not None:
+                    self.watched(message)
                 waiting = self._asked.get(mark)
                 if waiting is not None and not waiting.done():
                     waiting.set_result(message)

@@ -1,0 +1,335 @@
+"""Faces specification, section 3: clients that are not ours, each in an environment of its own.
+
+What each of them needs to be told is what `detent live` prints.
+"""
+
+import json
+import socket
+import struct
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from random import Random
+
+import numba
+import pytest
+from tests import foreign
+from tests.face_rig import Faced, connected, faced, family, listening
+
+pytestmark = [
+    pytest.mark.early,
+    pytest.mark.compiled,
+    pytest.mark.process,
+    pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time"),
+]
+
+GRAIN = 0.002  # what a position may differ by: two counts of the encoder and the window [mm]
+LINES = ("--scpi", ":0", "--grbl", "pty", "--gcs", ":0", "--zaber", ":0", "--alpaca", ":0", "--modbus", ":0")
+NAMES = LINES[::2]
+
+
+@pytest.fixture(scope="module")
+def lines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Faced]:
+    """The cascade axis with all that needs no extra library but pymodbus."""
+    pytest.importorskip("pymodbus")
+    with faced(tmp_path_factory.mktemp("lines"), *LINES) as live:
+        yield live
+
+
+@pytest.fixture
+def axis(lines: Faced) -> Iterator[Faced]:
+    """The same at 20 mm, enabled by nobody, commanded by nobody."""
+    with connected(lines) as own:
+        own.do("take")
+        if own.status["fault"]:
+            own.reset()
+        own.enable()
+        own.confirm()
+        own.move_to("20 mm")
+        own.disable()
+    yield lines
+
+
+def near(position: float, target: float, within: float = GRAIN * 5) -> bool:
+    """In the window of the axis, which is 0.05 mm wide at most."""
+    return abs(position - target) <= max(within, 0.05)
+
+
+# ---- line protocols
+
+
+def judge_scpi(found):
+    assert found["identity"].startswith("detent,cascade axis,cascade,")
+    assert (int(found["power_on"]) & 128, found["unit"]) == (128, "MM")
+    assert tuple(map(float, found["limits"].split(","))) == (0.0, 500.0)
+    assert (found["moving"], found["complete"]) == ("1", "1")
+    assert found["took"] > 0.1  # after arrival, not at once
+    assert near(found["position"], 60.0)
+    assert near(found["by"], 65.0)
+    done, place = found["second"].split(";")
+    assert (done, near(float(place), 61.0)) == ("1", True)
+    assert found["errors"] == [-113, -109, -104, -108, -222, -222, -113, -222]
+    assert found["status"] == 4
+    assert found["events"] & (32 | 16) == 48
+    assert 61.0 < found["stopped"] < 300.0
+    assert found["round_trip_ms"] < 20.0
+
+
+def test_23_pyvisa_over_a_socket(axis):
+    judge_scpi(foreign.run("visa", "scpi", axis.place("scpi")))
+
+
+def test_23_pyvisa_over_a_serial_terminal(axis, tmp_path):
+    with faced(tmp_path, "--scpi", "pty") as live:
+        judge_scpi(foreign.run("visa", "scpi", live.place("scpi")))
+
+
+def test_24_grbl_streamer(axis):
+    found = foreign.run("grbl", "grbl", axis.place("grbl"))
+    assert found["errors"] == []
+    assert near(found["position"], 57.0)
+    assert 80.0 < found["held"] < 250.0
+    assert found["held"] == pytest.approx(found["held_later"], abs=0.05)
+    assert near(found["resumed"], 260.0)
+    assert found["alarm"] == ["ALARM:3"]
+    assert 60.0 < found["reset_at"] < 240.0
+    assert found["reset_at"] == pytest.approx(found["reset_later"], abs=0.05)
+    assert (found["reset_mode"], found["unlocked"]) == ("Alarm", "Idle")
+
+
+def test_25_pipython(axis):
+    found = foreign.run("pi", "gcs", axis.port("gcs"))
+    assert found["axes"] == ["1"]
+    assert (found["without_servo"], found["servo"], found["referenced"]) == (5, True, True)
+    assert found["under_way"] is False
+    assert near(found["position"], 60.0)
+    assert (found["target"], found["on_target"]) == (60.0, True)
+    assert near(found["by"], 57.5)
+    assert (found["low"], found["high"], found["limit"], found["too_fast"], found["unknown"]) == (0.0, 500.0, 7, 8, 2)
+    assert found["speed"] == 40.0
+    assert 57.5 < found["stopped"] < 120.0
+    assert not found["moving"]
+
+
+def test_26_zaber_motion(axis):
+    found = foreign.run("zaber", "zaber", axis.port("zaber"))
+    assert near(found["home"] * 1e-3, 10.8, 0.9)  # 0.8 mm behind the switch, which is 10 mm from the end
+    assert near(found["position"] * 1e-3, 100.0)
+    assert not found["busy"]
+    assert near(found["by"] * 1e-3, 98.5)
+    assert (found["beyond"], found["nonsense"]) == ("BADDATA", "BADCOMMAND")
+    assert (found["under_way"], found["velocity_busy"]) == (True, True)
+    assert 98.5 < found["stopped"] * 1e-3 < 300.0
+    assert 3.0 < (found["after_velocity"] - found["stopped"]) * 1e-3 < 20.0
+    assert found["checksums"]
+
+
+def judge_alpaca(found, kind):
+    assert found["versions"] == [1]
+    (device,) = found["devices"]
+    assert (device["DeviceType"], device["DeviceNumber"]) == (kind, 0)
+    assert found["not_connected"] == found["left"] == "NotConnectedException"
+    assert found["moving"] is True
+    assert found["still"] is False
+    assert (found["transaction"], found["server"]) == (77, True)
+    # What is no request is HTTP 400; what the device cannot do is an error of ASCOM.
+    wrong = ("wrong_case", "no_number", "unknown", "bad_mark", "not_a_number", "flag")
+    assert [found[name] for name in wrong] == [400] * len(wrong)
+
+
+def test_27_alpyca_focuser(axis):
+    found = foreign.run("alpaca", "alpaca", axis.place("alpaca"), "focuser")
+    judge_alpaca(found, "Focuser")
+    assert (found["absolute"], found["max"], found["size"], found["comp"]) == (True, 500_000, 1.0, False)
+    assert near(found["position"] * 1e-3, 70.0)
+    assert found["temperature"] == "NotImplementedException"
+    assert found["action"] == "ActionNotImplementedException"
+    assert 70_000 < found["halted"] < found["far"]
+
+
+def test_27_alpyca_rotator(tmp_path):
+    with faced(tmp_path, "--alpaca", ":0", example="turntable.toml") as live:
+        found = foreign.run("alpaca", "alpaca", live.place("alpaca"), "rotator")
+    judge_alpaca(found, "Rotator")
+    assert found["reverse"] is False
+    assert found["position"] == pytest.approx(90.0, abs=0.1)
+    assert found["mechanical"] == pytest.approx(90.0, abs=0.1)
+    assert found["target"] == 90.0
+    assert found["by"] == pytest.approx(80.0, abs=0.1)
+    assert found["beyond"] == "InvalidValueException"
+    assert found["synced"] == [pytest.approx(45.0, abs=0.1), pytest.approx(80.0, abs=0.1)]
+
+
+# ---- Modbus
+
+IDENTITY, POSITION, SEQUENCE = 0, 16, 23
+
+
+def poll(axis: Faced, *words: str) -> subprocess.CompletedProcess[str]:
+    """mbpoll of Debian, once, with addresses as they are sent."""
+    program = foreign.program("mbpoll", "mbpoll")
+    command = [program, "-m", "tcp", "-p", axis.port("modbus"), "-0", "-1", "-q", *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def polled(axis: Faced, address: int, *kind: str) -> int:
+    """One value that mbpoll has read."""
+    out = poll(axis, "-r", str(address), *kind, "127.0.0.1").stdout
+    (line,) = [line for line in out.splitlines() if line.startswith(f"[{address}]")]
+    return int(line.split()[1])
+
+
+def test_19_mbpoll(axis):
+    assert polled(axis, IDENTITY) == 0x4454
+    assert near(polled(axis, POSITION, "-B", "-t", "4:int") * 1e-3, 20.0)
+    beat, sequence = 0, polled(axis, SEQUENCE)
+
+    def written(address: int, *values: int, kind: tuple[str, ...] = ()) -> bool:
+        done = poll(axis, "-r", str(address), *kind, "127.0.0.1", "--", *map(str, values))
+        return "Written" in done.stdout
+
+    def commanded(command: int, target: int = 0) -> int:
+        nonlocal beat, sequence
+        sequence, beat = sequence % 60_000 + 1, beat + 1
+        assert written(42, target, kind=("-B", "-t", "4:int"))
+        assert written(40, beat, command)
+        assert written(46, sequence)
+        begin = time.monotonic()
+        while polled(axis, SEQUENCE) != sequence or polled(axis, SEQUENCE + 1) == 1:
+            beat += 1
+            assert written(40, beat)
+            assert time.monotonic() - begin < 20.0
+        return polled(axis, SEQUENCE + 1)
+
+    assert commanded(1) == 2
+    assert commanded(7, 35_000) == 2
+    assert near(polled(axis, POSITION, "-B", "-t", "4:int") * 1e-3, 35.0)
+    refused = poll(axis, "-r", str(POSITION), "127.0.0.1", "7")
+    assert "Illegal data address" in refused.stderr  # exception 2
+
+
+def test_20_modbus_serial(axis):
+    folder = foreign.npm("modbus-serial@8.0.25")
+    script = Path(__file__).parents[1] / "clients" / "modbus-serial.js"
+    words = [foreign.program("node", "nodejs"), str(script), axis.port("modbus")]
+    done = subprocess.run(
+        [*words, str(folder / "node_modules" / "modbus-serial")], capture_output=True, text=True, timeout=60, check=False
+    )
+    found = json.loads(done.stdout)
+    assert (found["identification"], found["enabled"], found["moved"]) == (0x4454, [2, 0], [2, 0])
+    assert near(found["position"] * 1e-3, 45.0)
+    assert found["exception"] == 2
+
+
+def test_20_pymodbus(axis):
+    found = foreign.run("modbus", "modbus", axis.port("modbus"), "hand-shake")
+    assert found["identification"][:4] == [0x4454, 1, 0, 1000]
+    assert found["maker"] == "detent"
+    assert (found["enabled"], found["moved"], found["beyond"]) == ([2, 0], [2, 0], [4, 31])
+    assert near(found["position"] * 1e-3, 60.0)
+    assert near(found["by"][1] * 1e-3, 58.0)
+    assert (found["read_only"], found["no_address"], found["no_value"], found["no_function"]) == (2, 2, 3, 1)
+
+
+def test_21_no_command_without_a_heartbeat(axis):
+    time.sleep(0.8)  # what a test before has said is no heartbeat any more
+    found = foreign.run("modbus", "modbus", axis.port("modbus"), "silent")
+    assert found["enable"] == [4, 121]
+    assert found["stop"] == [2, 0]
+    assert found["moving"]
+    assert 0.1 < found["rest"] < 1.0
+    assert found["end"] < 100_000
+    assert found["result"][0] == 3
+
+
+def test_21_a_jog_lasts_as_long_as_the_heartbeat(axis):
+    found = foreign.run("modbus", "modbus", axis.port("modbus"), "jog")
+    assert found["velocity"] == pytest.approx(20_000, rel=0.05)
+    assert abs(found["after"]) < 200
+
+
+FRAMES = 100_000
+
+
+def fuzzed(random: Random) -> bytes:
+    """A frame that is nearly one: lengths, functions, counts and addresses that do not fit, and noise."""
+    body = random.choice((
+        random.randbytes(random.randrange(12)),
+        bytes([random.randrange(256)]) + random.randbytes(4),
+        struct.pack(">BHH", random.choice((1, 2, 3, 4, 5, 6, 15, 16, 22, 23, 43)), random.randrange(70), random.randrange(200)),
+        struct.pack(">BHHB", 16, random.randrange(60), random.randrange(130), random.randrange(256)) + random.randbytes(4),
+        struct.pack(">BHH", 6, 40, random.randrange(65536)),
+    ))
+    length = len(body) + 1 if random.random() < 0.9 else random.randrange(300)
+    return struct.pack(">HHHB", random.randrange(65536), int(random.random() < 0.02), length, random.randrange(256)) + body
+
+
+@pytest.mark.wide
+def test_22_fuzzed_frames_disturb_nobody(axis):
+    random, sent = Random(22), 0
+    with connected(axis) as own:
+        before = own.status["loop"]
+        while sent < FRAMES:
+            with socket.create_connection(("127.0.0.1", int(axis.port("modbus")))) as one:
+                one.settimeout(0.0)
+                for _ in range(2_000):
+                    try:
+                        one.sendall(fuzzed(random))
+                    except (BlockingIOError, ConnectionError):
+                        break
+                    sent += 1
+                    with suppress(BlockingIOError, ConnectionError):
+                        one.recv(1 << 16)
+            if random.random() < 0.1:
+                found = foreign.run("modbus", "modbus", axis.port("modbus"), "look")
+                assert found["identification"][0] == 0x4454
+        after = own.status["loop"]
+        assert own.status["fault"] is None
+        assert after["overruns"] - before["overruns"] <= 0.01 * (after["periods"] - before["periods"])
+    assert Path(f"/proc/{axis.process_of('modbus')}").exists()
+
+
+# ---- rules for all
+
+
+def test_29_a_second_commander_is_refused_by_each_protocol_and_may_stop(axis):
+    with connected(axis) as own:
+        own.do("take")
+        own.enable()
+        own.confirm()
+        moving = own.move_to("400 mm", speed=0.1, wait=False)
+        scpi = foreign.run("visa", "scpi", axis.place("scpi"), "refused")
+        assert not scpi["refused"].startswith("0,")
+        assert "(43)" in scpi["move_refused"]
+        assert scpi["stop"].startswith("0,")
+        with pytest.raises(Exception, match="stop ended it"):
+            moving.wait()
+        for environ, script, place in (
+            ("pi", "gcs", axis.port("gcs")), ("zaber", "zaber", axis.port("zaber")),
+        ):  # fmt: skip
+            moving = own.move_to("400 mm", speed=0.05, wait=False)
+            found = foreign.run(environ, script, place, "refused")
+            assert found["move"], f"{script} moved an axis that somebody else commands"
+            with pytest.raises(Exception, match="stop ended it"):
+                moving.wait()
+        moving = own.move_to("400 mm", speed=0.05, wait=False)
+        found = foreign.run("alpaca", "alpaca", axis.place("alpaca"), "focuser", "refused")
+        assert found["move"] == "InvalidOperationException"
+        with pytest.raises(Exception, match="stop ended it"):
+            moving.wait()
+        moving = own.move_to("400 mm", speed=0.05, wait=False)
+        found = foreign.run("modbus", "modbus", axis.port("modbus"), "refused")
+        assert (found["move"], found["stop"]) == ([4, 43], [2, 0])
+        with pytest.raises(Exception, match="stop ended it"):
+            moving.wait()
+
+
+def test_32_nothing_listens_unless_it_is_asked_for_but_the_panel_on_loopback(tmp_path):
+    with faced(tmp_path) as live:
+        port = int(live.started["panel"][0].partition("/enter")[0].rpartition(":")[2])
+        here = {("tcp", f"0100007F:{port:04X}"), ("tcp6", f"{'0' * 24}01000000:{port:04X}")}
+        found = listening(*family(live.process.pid))
+        assert found
+        assert found <= here

@@ -1,0 +1,86 @@
+"""`detent live` with faces, for clients of other people."""
+
+import shutil
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.live_processes import STARTED, Running
+
+import detent
+
+PERIOD = "10 ms"  # of the loop: this machine has no real-time priority, and two processors for all
+
+
+class Faced(Running):
+    """An axis that runs, and where its faces are."""
+
+    def place(self, face: str, number: int = 0) -> str:
+        """What is printed of a face."""
+        return self.started["faces"][face][number]
+
+    def port(self, face: str) -> str:
+        """Port of a face that listens on TCP."""
+        return next(place for place in self.started["faces"][face] if "::" not in place).rpartition(":")[2]
+
+    def process_of(self, face: str) -> int:
+        """Process of a face."""
+        return self.started["face_processes"][face]
+
+
+@contextmanager
+def faced(
+    folder: Path, *options: str, example: str = "cascade.toml", commands: bool = True, more: Sequence[str] = ()
+) -> Iterator[Faced]:
+    """`detent live` on a copy of an example, with options that ask for faces."""
+    file = folder / example
+    shutil.copy(detent.example(example), file)
+    folder.chmod(0o700)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        words = ["--period", PERIOD, "--no-store", *options, *(["--commands"] if commands else []), *more]
+        live = Faced(file, *words)
+        STARTED.remove(live.process)
+        try:
+            yield live
+        finally:
+            live.process.terminate()
+            try:
+                live.process.communicate(timeout=15)
+            except subprocess.TimeoutExpired:
+                live.process.kill()
+                live.process.communicate()
+
+
+def connected(live: Faced) -> Any:
+    """A client of detent's own, to see what happens, and to command beside."""
+    return detent.connect(live.file)
+
+
+def listening(*processes: int) -> set[tuple[str, str]]:
+    """Addresses at which processes listen, or take datagrams, from /proc/net: protocol and address with port."""
+    inodes: set[str] = set()
+    for process in processes:
+        for link in Path(f"/proc/{process}/fd").iterdir():
+            try:
+                target = str(link.readlink())
+            except OSError:
+                continue
+            if target.startswith("socket:["):
+                inodes.add(target[8:-1])
+    found: set[tuple[str, str]] = set()
+    for kind, waits in (("tcp", "0A"), ("tcp6", "0A"), ("udp", "07"), ("udp6", "07")):
+        for line in Path(f"/proc/net/{kind}").read_text(encoding="ascii").splitlines()[1:]:
+            words = line.split()
+            if words[9] in inodes and words[3] == waits:
+                found.add((kind, words[1]))
+    return found
+
+
+def family(process: int) -> list[int]:
+    """A process and all that it has started."""
+    children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="ascii").split()
+    return [process, *(one for child in children for one in family(int(child)))]
