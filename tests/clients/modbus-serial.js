@@ -6,6 +6,7 @@ let beat = 0;
 async function main() {
   await client.connectTCP("127.0.0.1", { port: Number(process.argv[2]) });
   client.setID(1);
+  beat = (await client.readHoldingRegisters(40, 1)).data[0];
   const read = async (address, count) => (await client.readHoldingRegisters(address, count)).data;
   const heart = () => client.writeRegisters(40, [(beat = (beat + 1) % 65536)]);
   async function command(number, target) {

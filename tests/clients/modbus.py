@@ -45,6 +45,7 @@ def command(number, target=0, speed=0, silent=False, wait=True):
     return read(24), read(25)
 
 
+beat = read(40)
 found = {"identification": client.read_holding_registers(0, count=26).registers}
 if what == "hand-shake":
     identity = client.read_device_information(read_code=1)
@@ -88,6 +89,7 @@ elif what == "jog":
         time.sleep(0.02)
     found["velocity"] = read(18, 2)
     command(3)
+    time.sleep(0.1)  # the commanded point rests at once, the load a little later
     found["after"] = read(18, 2)
 elif what == "refused":
     found["move"] = command(7, 1_000)

@@ -6,6 +6,7 @@ command, then a new sequence number; what the axis did with it stands in the ack
 
 import asyncio
 import contextlib
+import logging
 import time
 from typing import Any, NamedTuple
 
@@ -135,7 +136,7 @@ class Slave:
         wanted = range(address, address + number)
         if any(at not in ADDRESSES and not 26 <= at < FIRST_WRITABLE for at in wanted):
             return ExcCodes.ILLEGAL_ADDRESS
-        if function in READS:
+        if values is None:  # to read, or what a function 6 has written is read back for its answer
             registers[: SIZE - first] = self.show()
             return None
         if any(at not in ADDRESSES or not ADDRESSES[at].writable for at in wanted) or not self.axis.commands:
@@ -212,6 +213,7 @@ def device_of(slave: Slave, name: str) -> SimDevice:
 
 async def serve(desk: Desk, address: str) -> list[str]:
     """Serve; gives what a client needs."""
+    logging.getLogger("pymodbus").setLevel(logging.CRITICAL + 1)  # it tells of every frame that is none
     host, number = address_of(desk.face, address, PORT)
     slave = Slave(await desk.open())
     device = device_of(slave, slave.axis.about["name"])
