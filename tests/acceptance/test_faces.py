@@ -4,14 +4,18 @@ What each of them needs to be told is what `detent live` prints.
 """
 
 import json
+import os
+import signal
 import socket
 import struct
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import numba
 import pytest
@@ -291,7 +295,184 @@ def test_22_fuzzed_frames_disturb_nobody(axis):
     assert Path(f"/proc/{axis.process_of('modbus')}").exists()
 
 
+# ---- EPICS
+
+RECORD = "lab:m1"
+TYPES = {
+    "enum": "CNEN DIR FOFF HHSV HLSV HSV LLSV LOCK LSPG LSV NTM OMSL RMOD SET SEVR SPMG STAT STUP UEIP URIP",
+    "string": "DESC DINP DOL EGU INIT NAME OUT POST PREM RDBL RINP RLNK RTYP STOO",
+    "short": "ATHM CARD CDIR DMOV FOF HLS HOMF HOMR IGSET JOGF JOGR LLS LVIO MIP MISS MOVN NTMF PP PREC RCNT RHLS RLLS RTRY "
+    "SSET STOP SUSE SYNC TDIR TWF TWR VOF",
+    "double": "ACCL ADEL ALST BACC BDST BVEL DCOF DHLM DIFF DLLM DLY DRBV DVAL ERES HIGH HIHI HLM HOPR HVEL ICOF JAR JVEL "
+    "LDVL LLM LOLO LOPR LOW LRLV LVAL MDEL MLST MRES OFF PCOF RBV RDBD RLV RRES S SBAK SBAS SMAX TWV UREV VAL VBAS VELO VMAX",
+    "float": "FRAC VERS",
+    "long": "LRVL MMAP MSTA NMAP RDIF REP RMP RRBV RVAL RVEL SREV",
+}
+"""Fields of the record (motorRecord.dbd) by their type; what is unsigned there is served as the signed word of its width."""
+NUMBERS = {"string": 0, "short": 1, "float": 2, "enum": 3, "long": 5, "double": 6}  # of Channel Access
+
+
+def free_port() -> int:
+    """A port that nobody has now."""
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+@dataclass
+class Epics:
+    """An axis with both records, and what their clients are told."""
+
+    live: Faced
+
+    def told(self, face: str) -> dict[str, str]:
+        """Environment of a client, as it is printed."""
+        return dict(word.split("=") for word in self.live.place(face, 1).split())
+
+    def run(self, face: str, script: str, *words: str) -> dict[str, Any]:
+        """A client."""
+        return foreign.run("epics", script, *words, **self.told(face))
+
+
+@pytest.fixture(scope="module")
+def epics(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Epics]:
+    """The cascade axis as a motor record; somebody else's repeater, so that no client leaves one of its own behind."""
+    pytest.importorskip("caproto")
+    pytest.importorskip("p4p")
+    places = [f"{RECORD}@:{free_port()}" for _ in range(2)]
+    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    repeater = subprocess.Popen([str(foreign.environment("epics").parent / "caproto-repeater")], **quiet)
+    try:
+        with faced(tmp_path_factory.mktemp("epics"), "--epics", places[0], "--pva", places[1]) as live:
+            yield Epics(live)
+    finally:
+        repeater.terminate()
+        repeater.wait()
+
+
+WINDOW = 0.05  # of the example, limits.travel / 10000 [mm]
+
+
+@pytest.mark.parametrize("layer", ["pyepics", "caproto"])
+def test_01_ophyd_epics_motor(epics, layer):
+    found = epics.run("epics", "ophyd_motor", RECORD, layer, "moves")
+    assert found["connected"] < 10.0
+    assert (found["limits"], found["unit"], found["speed"]) == ([0.0, 500.0], "mm", 500.0)
+    assert found["success"]
+    assert near(found["position"], 60.0)
+    assert (found["limit"], found["after_limit"]) == ("LimitError", 60.0)
+    assert 0.01 < found["null"] < 2.0
+    assert found["moving"]
+    assert 60.0 < found["stopped"] < 400.0
+    assert found["stop"] == 0
+    assert found["set_point"] == pytest.approx(found["stopped"], abs=WINDOW)
+    assert near(found["again"], 20.0)
+
+
+@pytest.mark.parametrize(("number", "face", "scheme"), [(2, "epics", "ca"), (3, "pva", "pva")])
+def test_02_03_ophyd_async_motor(epics, number, face, scheme):
+    found = epics.run(face, "ophyd_async_motor", f"{scheme}://{RECORD}")
+    assert near(found["position"], 45.0)
+    assert (found["unit"], found["limit"], found["timeout"]) == ("mm", "MotorLimitsError", "TimeoutError")
+    assert 45.0 < found["stopped"] < 400.0
+    assert found["points"] == 21
+    assert found["worst"] <= WINDOW
+
+
+def test_04_bluesky_scans_also_after_a_stop(epics):
+    found = epics.run("epics", "ophyd_motor", RECORD, "pyepics", "scans")
+    for scan in ("first", "second", "third"):
+        assert found[scan]["points"] == 21
+        assert found[scan]["worst"] <= WINDOW
+
+
+def test_05_a_null_move_pulses_done_and_is_complete_behind_it(epics):
+    found = epics.run("epics", "ophyd_motor", RECORD, "pyepics", "pulse")
+    assert found["seen"] == [0, 1, "complete"]
+
+
+def test_06_every_field_has_its_type(epics):
+    fields = [field for names in TYPES.values() for field in names.split()]
+    found = epics.run("epics", "fields", RECORD, ",".join(fields))
+    expected = {field: kind for kind, names in TYPES.items() for field in names.split()}
+    assert found["pyepics"] == expected
+    assert found["aioca"] == {field: NUMBERS[kind] for field, kind in expected.items()}
+    assert found["none"] == []
+    assert (found["extras"]["trust"], found["extras"]["state"]) == ("referenced", "operation enabled")
+    assert found["extras"]["sample"].count(",") == 4
+
+
+def test_07_a_jog_lives_by_repeated_puts(epics):
+    found = epics.run("epics", "ophyd_motor", RECORD, "pyepics", "jog")
+    assert 0.1 < found["once"] < 1.0
+    assert 4.0 < found["once_way"] < 20.0  # 40 mm/s for the lease of 200 ms, and the stop
+    assert found["kept_moving"]
+    assert 50.0 < found["kept_way"] < 70.0
+    assert found["stopped"] >= found["kept_way"]
+
+
 # ---- rules for all
+
+
+@pytest.mark.parametrize("face", ["scpi", "modbus"])
+def test_08_a_killed_face_leaves_an_axis_that_stops_in_a_ramp(axis, face):
+    """Killed in a move of its own; the panel's line says who was lost, and the face comes back."""
+    if face == "scpi":
+        client = socket.create_connection(("127.0.0.1", int(axis.port("scpi"))))
+        client.sendall(b"ENAB\nMOVE:ABS 450,50\n")
+    else:
+        client = foreign.start("modbus", "modbus", axis.port("modbus"), "leave moving")
+    with connected(axis) as own:
+        until(lambda: abs(own.status["velocity"]) > 0.045)
+        killed = axis.process_of(face)
+        os.kill(killed, signal.SIGKILL)
+        begin, speeds = time.monotonic(), [0.05]
+        while time.monotonic() - begin < 2.0 and not (status := own.status)["rests"]:
+            speeds.append(abs(status["commanded"]))
+        assert status["rests"]
+        assert status["state"] == "operation enabled"
+        assert status["fault"] is None
+        assert status["client"] == 0
+        lines = [json.loads(line) for line in audit_of(axis)]
+        lost = [line["note"] for line in lines if f"{face} face" in line.get("note", "")]
+        assert lost[-1].endswith("has gone in a move to, which was stopped")
+        told = watched(axis)
+        assert f"{face} face" in told["lost"]
+    client.close() if face == "scpi" else (client.kill(), client.communicate())
+    until(lambda: reached(axis.port(face)))
+
+
+def until(met: Callable[[], object], seconds: float = 10.0) -> None:
+    """Wait until something holds."""
+    begin = time.monotonic()
+    while not met():
+        assert time.monotonic() - begin < seconds, "it did not come"
+        time.sleep(0.005)
+
+
+def reached(port: str) -> bool:
+    """Whether somebody listens."""
+    with suppress(OSError), socket.create_connection(("127.0.0.1", int(port)), timeout=1.0):
+        return True
+    return False
+
+
+def audit_of(axis: Faced) -> list[str]:
+    """The log of who asked for what."""
+    (file,) = Path(axis.started["channel"]).parent.glob("*.audit")
+    return file.read_text(encoding="utf-8").splitlines()
+
+
+def watched(axis: Faced) -> dict[str, Any]:
+    """What a panel is told, once."""
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect(axis.started["channel"])
+        line.sendall(b'{"do": "watch", "rate": 50}\n')
+        for text in line.makefile():
+            message = json.loads(text)
+            if "why" in message:
+                return message
+    raise AssertionError("no status came")
 
 
 def test_29_a_second_commander_is_refused_by_each_protocol_and_may_stop(axis):

@@ -91,6 +91,12 @@ elif what == "jog":
     command(3)
     time.sleep(0.1)  # the commanded point rests at once, the load a little later
     found["after"] = read(18, 2)
+elif what == "leave moving":
+    command(1)
+    command(7, 450_000, 50_000, wait=False)
+    while True:
+        heart()
+        time.sleep(0.05)
 elif what == "refused":
     found["move"] = command(7, 1_000)
     found["stop"] = command(3)

@@ -84,8 +84,8 @@ class Device:
 
     async def _connect(self, said: dict[str, str]) -> None:
         self.connected = flag_of(said, "Connected")
-        if not self.connected and not self.axis.is_others and self.axis.commands:
-            await self.axis.do("leave")
+        if not self.connected:
+            await self.axis.give_back()
 
     async def _halt(self, _said: dict[str, str]) -> None:
         await self.axis.stop()

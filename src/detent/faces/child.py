@@ -67,9 +67,9 @@ class Faces:
             why = answer.get("error", "its process ended")
             raise AxisError(f"--{face}: the face did not start ({why}); mend that, choose another place, or do without it")
         self.places[face] = answer["places"]
-        place: str = answer["places"][0]
-        if place.rpartition(":")[2].isdigit() and self._addresses[face].endswith(":0"):
-            self._addresses[face] = place  # clients find it there again
+        listens = [place for place in answer["places"] if "::" not in place and place.rpartition(":")[2].isdigit()]
+        if listens and self._addresses[face].endswith(":0"):
+            self._addresses[face] = listens[0]  # clients find it there again
 
     def mend(self) -> list[str]:
         """Start again what has died; tells what has happened."""

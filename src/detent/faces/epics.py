@@ -11,12 +11,11 @@ from caproto.asyncio.server import Context
 from caproto.server import PVGroup, pvproperty
 
 from detent.errors import DetentError
-from detent.faces.motor import Motor
-from detent.faces.service import Desk, address_of
+from detent.faces.motor import Motor, name_of
+from detent.faces.service import Desk
 
 PORT = 5064
-EXTRAS = {"trust": str, "state": str, "fault": int, "fault_text": str, "sample": str, "effort": float}
-CONVERT = {"EGU": str, "DIR": int, "SPMG": int, "SET": int, "CNEN": int, "FOFF": int, "LSPG": int}
+SHOWN = 0.02  # until what has changed is at its clients: a put is complete behind that [s]
 
 
 class Record(PVGroup):
@@ -39,6 +38,7 @@ class Served:
         self.value: Any = self.group.motor
         self.fields: dict[str, Any] = dict(self.value.fields)
         self.motor: Motor
+        self._refused: list[Any] = []  # puts were, which caproto makes an alarm of theirs
 
     def attach(self, motor: Motor) -> None:
         """Puts go to the record."""
@@ -55,14 +55,18 @@ class Served:
                 asked = list(instance.enum_strings).index(asked)
             if isinstance(asked, bytes | str):  # a name of a unit: it stays what it is
                 asked = self.motor.fields[name]
-            await self.motor.put(name, asked)
+            try:
+                await self.motor.put(name, asked)
+            except DetentError:
+                self._refused.append(instance)
+                raise
+            await asyncio.sleep(SHOWN)
             return self.motor.fields.get(name, asked)
 
         return put
 
     async def show(self, fields: Mapping[str, Any]) -> None:
         """Tell clients what has changed."""
-        alarm = {"severity": AlarmSeverity(self.motor.severity), "status": AlarmStatus(self.motor.status)}
         if fields.keys() & {"HLM", "LLM"}:
             ends = {"upper_ctrl_limit": self.motor.fields["HLM"], "lower_ctrl_limit": self.motor.fields["LLM"]}
             await self.value.write_metadata(**ends)
@@ -71,8 +75,6 @@ class Served:
                 await self.value.write(value, verify_value=False)
             elif name in self.fields:
                 await self.fields[name].write(value, verify_value=False)
-        if self.value.alarm.severity != alarm["severity"]:
-            await self.value.alarm.write(**alarm)
 
     async def begin(self, motor: Motor) -> None:
         """What does not change, and all that there is now."""
@@ -82,7 +84,6 @@ class Served:
                 await field.write_metadata(precision=motor.fields["PREC"])
             if hasattr(field, "units") and field.name.split(".")[-1] not in ("ACCL", "BACC", "DLY"):
                 await field.write_metadata(units=motor.axis.unit)
-        await self.fields["DESC"].write(motor.axis.about["name"][:40], verify_value=False)
         await self.show(motor.fields)
 
     async def follow(self, motor: Motor) -> None:
@@ -93,22 +94,20 @@ class Served:
                 if shown.get(name) != value:
                     await getattr(self.group, name).write(value, verify_value=False)
                     shown[name] = value
-            await asyncio.sleep(0.02)
-
-
-def name_of(address: str) -> tuple[str, str, int]:
-    """Record, host and port of ``lab:m1`` or ``lab:m1@127.0.0.1:5064``."""
-    name, _, place = address.partition("@")
-    if not name or len(name) > 50 or any(not (c.isalnum() or c in "_-:+[]<>;") for c in name):
-        raise DetentError(f'epics: got a record called {name!r:.60}; expected letters, digits and any of "_-:+[]<>;"')
-    return (name, *address_of("epics", place, PORT))
+            while self._refused:
+                await self._refused.pop().alarm.write(severity=AlarmSeverity.NO_ALARM, status=AlarmStatus.NO_ALARM)
+            if self.value.alarm.severity != motor.severity:
+                await self.value.alarm.write(
+                    severity=AlarmSeverity(motor.severity), status=AlarmStatus(motor.status)
+                )
+            await asyncio.sleep(SHOWN)
 
 
 async def serve(desk: Desk, address: str) -> list[str]:
     """Serve; gives what a client needs."""
     for logger in ("caproto", "caproto.circ", "caproto.ctx", "caproto.bcast", "caproto.ch"):
         logging.getLogger(logger).setLevel(logging.CRITICAL + 1)
-    name, host, port = name_of(address)
+    name, host, port = name_of("epics", address, PORT)
     # Beacons go where clients are told to listen, not to all networks.
     os.environ |= {
         "EPICS_CA_SERVER_PORT": str(port), "EPICS_CAS_SERVER_PORT": str(port), "EPICS_CAS_INTF_ADDR_LIST": host,

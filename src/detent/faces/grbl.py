@@ -96,6 +96,8 @@ class Machine:
             self._now = None
             if not self.blocks:
                 self.jogging = False
+                for axis in self.axes:
+                    await axis.give_back()
 
     async def _make(self, block: Block) -> None:
         """Make a move; what a hold has stopped is made to its end afterwards."""

@@ -194,9 +194,9 @@ class Slave:
             await asyncio.sleep(LOOK)
             running = self.axis.status["running"]
             with contextlib.suppress(DetentError):
-                if self._commands and running and not self._is_heard():
+                if self._commands and not self._is_heard():
                     self._commands = False
-                    await self.axis.do("leave")
+                    await self.axis.do("leave")  # stops what is under way, and lets others command
                 elif self._commands and running and running["command"] == "jog":
                     await self.axis.hold()
 

@@ -9,13 +9,14 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from detent.errors import DetentError
-from detent.faces.service import AxisService, NotDoneError
+from detent.faces.service import AxisService, NotDoneError, address_of
 
 STOP, PAUSE, MOVE, GO = range(4)  # of SPMG
 MAJOR, STATE_ALARM = 2, 7  # severity and status of a fault
 POSITIVE, AT_PLUS, AT_POSITION, SLIP, HAS_ENCODER, PROBLEM, MOVING, AT_MINUS, HOMED, DONE = (
     1 << bit for bit in (0, 2, 5, 6, 8, 9, 10, 13, 14, 1)
 )  # of MSTA
+COUNTS = 1000  # of a revolution, as the record counts them: the axis does not say how many its motor makes
 Show = Callable[[Mapping[str, Any]], Awaitable[None]]
 
 
@@ -33,6 +34,7 @@ class Motor:
             "VELO": axis.speed, "VMAX": axis.speed, "VBAS": 0.0, "JVEL": axis.speed / 4, "HVEL": axis.speed / 10,
             "DHLM": high, "DLLM": low, "HLM": high, "LLM": low, "LVIO": 0, "MRES": axis.count, "ERES": axis.count,
             "EGU": axis.unit, "PREC": 4, "CNEN": 0, "RDBD": axis.count, "LSPG": GO,
+            "SREV": COUNTS, "UREV": COUNTS * axis.count, "OUT": "@detent", "DESC": axis.about["name"][:40],
         }  # fmt: skip
         self._moves = 0  # motions that clients wait for
         self._ends = (low, high)
@@ -181,6 +183,7 @@ class Motor:
             await self.change(self._seen())
             if not self._moves:
                 await self.change({"DMOV": 1, "MOVN": 0, "MIP": 0})
+                await self.axis.give_back()
 
     async def _by(self, way: float) -> None:
         await self.change({"RLV": 0.0})
@@ -220,6 +223,7 @@ class Motor:
         while self.axis.moving and not self.axis.gone.is_set():
             await asyncio.sleep(0.02)
         self._jogs = False
+        await self.axis.give_back()
         await self.change({"VAL": self.user(self.axis.commanded), field: 0})
         await self.show_sample()
 
@@ -246,6 +250,7 @@ class Motor:
             await (self.axis.enable() if value else self.axis.do("disable"))
         finally:
             await self.change({"CNEN": int(self.axis.enabled)})
+            await self.axis.give_back()
 
     async def _limit(self, field: str, value: float) -> None:
         """Soft limits of the record, within those of the axis."""
@@ -279,3 +284,11 @@ class Motor:
             "trust": axis.status["trust"], "state": axis.status["state"], "fault": axis.fault,
             "fault_text": axis.fault_text[:200], "sample": str(axis.sample), "effort": float(axis.status["effort"] or 0.0),
         }  # fmt: skip
+
+
+def name_of(face: str, address: str, port: int) -> tuple[str, str, int]:
+    """Record, host and port of ``lab:m1`` or ``lab:m1@127.0.0.1:5064``."""
+    name, _, place = address.partition("@")
+    if not name or len(name) > 50 or any(not (c.isalnum() or c in "_-:+[]<>;") for c in name):
+        raise DetentError(f'{face}: got a record called {name!r:.60}; expected letters, digits and any of "_-:+[]<>;"')
+    return (name, *address_of(face, place, port))

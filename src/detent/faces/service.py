@@ -18,7 +18,7 @@ RATE = 50.0  # samples that are shown in a second
 LOOK = 2e-3  # how often it is looked whether a motion has begun [s]
 KEEP = 0.05  # how often a jog is kept on behalf of who holds it [s]
 MOVES = "move to", "move by", "jog", "go", "home", "job"
-MOTIONS = "move_to", "move_by", "jog", "home"  # by the words that ask for them
+MOTIONS = "move_to", "move_by", "jog", "home", "stop"  # by the words that ask for them
 SECOND, BEYOND, UNREFERENCED, READ_ONLY = 43, 31, 35, 120
 OPEN = "stop", "disable"  # to everyone, also where a face may only read
 USER_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / math.pi)}
@@ -66,6 +66,9 @@ class AxisService:
         self.target = 0.0  # of the last move that was asked for here
         self._tell: list[Callable[[], object]] = []
         self._kept: asyncio.Future[None] | None = None
+        self._stops: set[asyncio.Future[dict[str, Any]]] = set()  # those of them that are stops
+        self._giving: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._giving.set_result(None)
         self._number, self._come = 0, asyncio.Event()  # of this client among those of the axis, once it is known
         self._open: set[asyncio.Future[dict[str, Any]]] = set()  # motions that were asked for, and have not ended
         line.watched = self._take
@@ -200,14 +203,18 @@ class AxisService:
             )  # fmt: skip
         ending: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         if word in MOTIONS:
-            self._open.add(ending)
-            ending.add_done_callback(self._open.discard)
+            if word != "stop" and self._stops:  # what is asked behind a stop is not meant to be ended by it
+                await asyncio.wait(self._stops, timeout=PATIENCE)
+            for group in (self._open, self._stops) if word == "stop" else (self._open,):
+                group.add(ending)
+                ending.add_done_callback(group.discard)
         message = {"do": word, "speed": speed} | ({} if value is None else {"value": value})
         try:
             answer = await self._line.ask(message, lambda told: ending.done() or ending.set_result(told["ended"]))
             self.asked = answer["id"]
         except DetentError:
             self._open.discard(ending)
+            self._stops.discard(ending)
             raise
         return ending
 
@@ -286,6 +293,21 @@ class AxisService:
             self._kept.cancel()
             self._kept = None
 
+    async def give_back(self) -> None:
+        """Let others command: of protocols that know no session, each motion is one."""
+        if self.commands and self._giving.done():
+            self._giving = asyncio.ensure_future(self._give_back())
+
+    async def _give_back(self) -> None:
+        while not self.gone.is_set():
+            await self.refresh()
+            if self._open or self.is_others:  # another motion, which will do it at its end
+                return
+            if not self.status["running"]:  # else it would take the place of a stop that somebody waits for
+                await self.begin("leave")
+                return
+            await asyncio.sleep(KEEP)
+
     async def stop(self) -> None:
         """Come to rest; taken from everybody, in every state."""
         self.let_go()
@@ -299,6 +321,7 @@ class Desk:
         self.channel, self.face, self.commands = channel, face, commands
         self._services: list[AxisService] = []
         self._tasks: list[asyncio.Future[Any]] = []
+        self.server: Any = None  # what else must stay for as long as the face does
 
     async def open(self, who: str = "") -> AxisService:
         """Another client of the axis; `who` is at the other end."""
