@@ -37,6 +37,7 @@ class Motor:
             "SREV": COUNTS, "UREV": COUNTS * axis.count, "OUT": "@detent", "DESC": axis.about["name"][:40],
         }  # fmt: skip
         self._moves = 0  # motions that clients wait for
+        self._asked = 0  # set-points so far
         self._ends = (low, high)
         self._jogs = False
         self.severity = self.status = 0
@@ -154,6 +155,7 @@ class Motor:
         if self.axis.limits and low < high and not low <= user <= high:
             await self.change({"LVIO": 1})
             raise NotDoneError("move_to", "refused", 31, f"beyond the limits, {low:g} to {high:g} {self.axis.unit}")
+        self._asked += 1
         await self.change({"VAL": user, "LVIO": 0})
         await self._motion(self.axis.move_to(self.dial(user), self.fields["VELO"]))
         if self.fields["SPMG"] == MOVE:
@@ -230,11 +232,13 @@ class Motor:
     async def _stop(self, value: int) -> None:
         """Stop, and be ready for the next time: also when it stood."""
         if value:
+            asked = self._asked
             try:
                 await self.axis.stop()
             finally:
                 self._jogs = False
-                await self.change({"STOP": 0, "VAL": self.user(self.axis.commanded), "JOGF": 0, "JOGR": 0})
+                after = {"VAL": self.user(self.axis.commanded)} if asked == self._asked else {}  # no new one meanwhile
+                await self.change({"STOP": 0, "JOGF": 0, "JOGR": 0} | after)
 
     async def _mode(self, value: int) -> None:
         before, target = self.fields["SPMG"], self.fields["VAL"]

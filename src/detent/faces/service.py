@@ -311,7 +311,13 @@ class AxisService:
     async def stop(self) -> None:
         """Come to rest; taken from everybody, in every state."""
         self.let_go()
-        await self.do("stop")
+        try:
+            await self.do("stop")
+        except NotDoneError as error:
+            if error.how != "aborted":
+                raise
+            if self._stops:  # another stop has taken its place, and leads to the same rest
+                await asyncio.wait(self._stops, timeout=PATIENCE)
 
 
 class Desk:
