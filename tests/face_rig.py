@@ -1,7 +1,12 @@
 """`detent live` with faces, for clients of other people."""
 
+import asyncio
+import os
+import select
 import shutil
 import subprocess
+import threading
+import tty
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -84,3 +89,60 @@ def family(process: int) -> list[int]:
     """A process and all that it has started."""
     children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="ascii").split()
     return [process, *(one for child in children for one in family(int(child)))]
+
+
+@contextmanager
+def wire() -> Iterator[tuple[str, str]]:
+    """A serial line between two terminals."""
+    ours, theirs = zip(*(os.openpty() for _ in range(2)), strict=True)
+    for end in theirs:
+        tty.setraw(end)
+    left = threading.Event()
+
+    def carry() -> None:
+        while not left.is_set():
+            for end in select.select(ours, [], [], 0.05)[0]:
+                os.write(ours[1 - ours.index(end)], os.read(end, 4096))
+
+    carrier = threading.Thread(target=carry)
+    carrier.start()
+    try:
+        yield os.ttyname(theirs[0]), os.ttyname(theirs[1])
+    finally:
+        left.set()
+        carrier.join()
+        for end in (*ours, *theirs):
+            os.close(end)
+
+
+@contextmanager
+def drive_on_virtual(live: Faced, channel: str, *, commands: bool = True) -> Iterator[tuple[Any, Any, str]]:
+    """The face of a CiA 402 drive in this process, where python-can's virtual bus is; its node, a network, its EDS."""
+    canopen = pytest.importorskip("canopen")
+    from detent.faces import node402
+    from detent.faces.service import Desk
+
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+    desk = Desk(Path(live.started["channel"]), "canopen", commands)
+    network = canopen.Network()
+    network.connect(interface="virtual", channel=channel)
+    try:
+        places = asyncio.run_coroutine_threadsafe(node402.serve(desk, f"virtual:{channel}@5"), loop).result(10)
+        yield desk, network, places[2].removeprefix("EDS ")
+    finally:
+        network.disconnect()
+        desk.server.disconnect()
+
+        async def leave() -> None:
+            desk.close()
+            others = asyncio.all_tasks() - {asyncio.current_task()}
+            for task in others:
+                task.cancel()
+            await asyncio.gather(*others, return_exceptions=True)
+
+        asyncio.run_coroutine_threadsafe(leave(), loop).result(10)
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()

@@ -20,7 +20,9 @@ from typing import Any
 import numba
 import pytest
 from tests import foreign
-from tests.face_rig import Faced, connected, faced, family, listening
+from tests.face_rig import Faced, connected, drive_on_virtual, faced, family, listening, wire
+
+from detent.faces.set_points import SetPoints
 
 pytestmark = [
     pytest.mark.early,
@@ -409,6 +411,296 @@ def test_07_a_jog_lives_by_repeated_puts(epics):
     assert found["kept_moving"]
     assert 50.0 < found["kept_way"] < 70.0
     assert found["stopped"] >= found["kept_way"]
+
+
+# ---- CiA 402
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Faced]:
+    """The cascade axis without a face; tests make that of a drive in their own process."""
+    with faced(tmp_path_factory.mktemp("plain"), "--headless") as live:
+        yield live
+
+
+@pytest.fixture
+def still(plain: Faced) -> Iterator[Faced]:
+    """The same, off, without a fault, at rest, commanded by nobody."""
+    with connected(plain) as own:
+        own.do("take")
+        own.disable()
+        if own.status["fault"]:
+            own.inject("nothing")
+            own.reset()
+        if own.status["trust"] == "unknown":
+            own.do("trust", 2)
+    yield plain
+
+
+def judge_session(found: dict[str, Any]) -> None:
+    """What a session of a master has come to."""
+    assert found["device"] == 0x00020192
+    assert (found["enabled"], found["quick"], found["off"]) == (
+        "OPERATION ENABLED", "QUICK STOP ACTIVE", "SWITCH ON DISABLED"
+    )  # fmt: skip
+    assert near(found["position"] * 1e-3, 60.0)
+    assert near(found["by"] * 1e-3, 58.0)
+    assert near(found["homed"] * 1e-3, 10.8, 0.9)
+    assert found["velocity"] == pytest.approx(40_000, abs=4_000)
+
+
+def test_09_base_node_402_on_a_virtual_bus(still):
+    from tests.clients.p402 import session
+
+    with drive_on_virtual(still, "nine") as (_, network, sheet):
+        judge_session(session(network, 5, sheet))
+
+
+def test_10_the_same_on_slcan_from_another_process(tmp_path):
+    with wire() as (ours, theirs), faced(tmp_path, "--headless", "--canopen", f"slcan:{ours}@5") as live:
+        sheet = live.place("canopen", 2).removeprefix("EDS ")
+        judge_session(foreign.run("can", "p402", "slcan", theirs, "5", sheet))
+
+
+GROUP = "239.74.163.2"
+
+
+@pytest.mark.wide
+def test_11_the_same_on_udp_multicast_with_the_filters_that_are_printed(tmp_path):
+    with faced(tmp_path, "--headless", "--canopen", f"udp_multicast:{GROUP}@5") as live:
+        sheet = live.place("canopen", 2).removeprefix("EDS ")
+        filters = live.place("canopen", 1).removeprefix("can_filters ").split(", ")
+        for _ in range(20):
+            judge_session(foreign.run("can", "p402", "udp_multicast", GROUP, "5", sheet, *filters))
+
+
+def test_12_the_sheet_is_loaded_and_comes_out_equal(still, tmp_path):
+    canopen = pytest.importorskip("canopen")
+    with drive_on_virtual(still, "twelve") as (_, _, sheet):
+        first = canopen.import_od(sheet, 5)
+        again = tmp_path / "again.eds"
+        canopen.export_od(first, str(again))
+
+        def lines(file: Path) -> list[str]:
+            stamps = ("CreationDate", "CreationTime", "ModificationDate", "ModificationTime", "FileName")
+            return [one for one in file.read_text().splitlines() if not one.startswith(stamps)]
+
+        assert lines(again) == lines(Path(sheet))
+        assert len(first) > 40
+
+
+def remote(network: Any, sheet: str) -> Any:
+    """A node of the library, set up and operational."""
+    from tests.clients.p402 import patient
+
+    p402 = pytest.importorskip("canopen.profiles.p402")
+    node = patient(p402.BaseNode402(5, sheet))
+    network.add_node(node)
+    node.nmt.send_command(0x80)
+    time.sleep(0.05)
+    node.setup_402_state_machine()
+    node.nmt.send_command(0x01)
+    time.sleep(0.05)
+    return node
+
+
+def comes(node: Any, state: str) -> None:
+    """The state is there soon."""
+    until(lambda: (node.check_statusword(), node.state)[1] == state)
+
+
+WAYS = {
+    "SWITCH ON DISABLED": (0x00,), "READY TO SWITCH ON": (0x00, 0x06), "SWITCHED ON": (0x00, 0x06, 0x07),
+    "OPERATION ENABLED": (0x00, 0x06, 0x07, 0x0F), "QUICK STOP ACTIVE": (0x00, 0x06, 0x07, 0x0F, 0x02),
+}  # fmt: skip
+"""Control words that lead to a state."""
+
+
+def test_13_transitions_by_control_word(still):
+    p402 = pytest.importorskip("canopen.profiles.p402")
+    with drive_on_virtual(still, "thirteen") as (_, network, sheet), connected(still) as own:
+        node = remote(network, sheet)
+
+        def send(word: int) -> None:
+            node.sdo[0x6040].raw = word
+            time.sleep(0.06)
+
+        def at(state: str) -> None:
+            for word in WAYS[state]:
+                send(word)
+            comes(node, state)
+
+        for (begin, end), word in p402.State402.TRANSITIONTABLE.items():
+            if begin in WAYS:
+                at(begin)
+                node.sdo[0x6040].raw = word
+                comes(node, end)
+        for state in ("SWITCH ON DISABLED", "READY TO SWITCH ON"):  # words that mean nothing there
+            at(state)
+            send(0x0F if state == "SWITCH ON DISABLED" else 0x06)
+            send(0x80)  # nor does the reset of no fault
+            node.check_statusword()
+            assert node.state == state
+        at("OPERATION ENABLED")
+        own.inject("encoder stuck")
+        own_fault(own, node)
+        comes(node, "FAULT")
+        send(0x0F)
+        node.check_statusword()
+        assert node.state == "FAULT"
+        own.inject("nothing")
+        send(0x80)
+        comes(node, "SWITCH ON DISABLED")
+
+
+def own_fault(own: Any, node: Any) -> None:
+    """Let the axis find out that its encoder is stuck: by a move."""
+    node.sdo[0x607A].raw = 200_000
+    node.sdo[0x6040].raw = 0x0F
+    time.sleep(0.05)
+    node.sdo[0x6040].raw = 0x3F
+    until(lambda: own.status["fault"] is not None)
+
+
+class Table:
+    """Reference for set-points, from the table of the standard: what bit 12 is, and where it goes next."""
+
+    def __init__(self) -> None:
+        self.queue: list[int] = []  # under way, then waiting
+        self.bit4 = self.bit12 = 0
+        self.origin = 0
+
+    def word(self, word: int, value: int) -> list[int]:
+        """Targets that begin now."""
+        rises, self.bit4 = word >> 4 & 1 > self.bit4, word >> 4 & 1
+        begun: list[int] = []
+        if rises and not self.bit12:
+            target = self.origin + value if word & 64 else value
+            self.origin = target
+            begun = [target] if word & 32 or not self.queue else []
+            self.queue = [target] if begun else [self.queue[0], target]
+            self.bit12 = 1
+        self.settle()
+        return begun
+
+    def arrive(self) -> list[int]:
+        """The target under way is reached."""
+        self.queue = self.queue[1:]
+        self.settle()
+        return self.queue[:1]
+
+    def settle(self) -> None:
+        """Bit 12 falls with bit 4, but not while one waits."""
+        if not self.bit4 and len(self.queue) < 2:
+            self.bit12 = 0
+
+
+def test_14_set_points_as_the_table_has_them():
+    for seed in range(200):
+        random, table, ours = Random(seed), Table(), SetPoints()
+        for _ in range(200):
+            if random.random() < 0.2 and table.queue:
+                following = ours.reached()
+                assert table.arrive() == ([] if following is None else [following])
+            else:
+                word = random.choice((0, 0x10, 0x10, 0x30, 0x50, 0x70)) | 0x0F
+                value = random.randrange(-1000, 1000)
+                begun = ours.control(word, value)
+                assert table.word(word, value) == ([] if begun is None else [begun])
+            assert ours.acknowledged == bool(table.bit12)
+            assert [one for one in (ours.active, ours.waiting) if one is not None] == table.queue
+
+
+def test_16_a_fault_is_told_and_left_by_an_edge(still):
+    with drive_on_virtual(still, "sixteen") as (_, network, sheet), connected(still) as own:
+        node, heard = remote(network, sheet), []
+        node.emcy.add_callback(lambda error: heard.append(error.code))
+        node.state = "OPERATION ENABLED"
+        own.inject("encoder stuck")
+        own_fault(own, node)
+        comes(node, "FAULT")
+        code = node.sdo[0x603F].raw
+        number = own.status["fault"]["code"]
+        assert code == {1: 0x7305, 10: 0x8611, 12: 0x7121}.get(number, 0xFF00 | number)
+        until(lambda: heard)
+        assert heard[0] == code
+        assert node.sdo[0x1001].raw & 1
+        own.inject("nothing")
+        node.sdo[0x6040].raw = 0x80
+        comes(node, "SWITCH ON DISABLED")
+        until(lambda: heard[-1] == 0)
+        own.inject("encoder stuck")
+        for word in (0x86, 0x87, 0x8F):  # the bit stays: no edge
+            node.sdo[0x6040].raw = word
+        assert node.sdo[0x603F].raw == 0
+        own.inject("nothing")
+
+
+@pytest.mark.parametrize(
+    ("option", "state"),
+    [(0, "OPERATION ENABLED"), (1, "FAULT"), (2, "SWITCH ON DISABLED"), (3, "QUICK STOP ACTIVE")],
+)
+def test_17_a_lost_master(still, option, state):
+    with drive_on_virtual(still, f"seventeen {option}") as (_, network, sheet), connected(still) as own:
+        node = remote(network, sheet)
+        node.sdo[0x6007].raw = option
+        beating = network.send_periodic(0x700 + 127, [5], 0.02)
+        time.sleep(0.05)
+        node.sdo[0x1016][1].raw = 127 << 16 | 200
+        node.op_mode = "PROFILED VELOCITY"
+        node.state = "OPERATION ENABLED"
+        node.sdo[0x60FF].raw = 30_000
+        until(lambda: abs(own.status["velocity"]) > 0.025)
+        beating.stop()
+        comes(node, state)
+        until(lambda: own.status["rests"] and abs(own.status["velocity"]) < 1e-3)
+        assert node.sdo[0x603F].raw == (0x8130 if option == 1 else 0)
+        if option == 1:
+            node.sdo[0x6040].raw = 0x80
+            comes(node, "SWITCH ON DISABLED")
+
+
+TABLE = """
+1000 0 u32 ro 00020192|1001 0 u8 ro 0|1016 1 u32 rw 0|1017 0 u16 rw 0|1018 2 u32 ro 402|6007 0 i16 rw 3|603F 0 u16 ro 0
+6040 0 u16 rw 0|6041 0 u16 ro *|605A 0 i16 ro 6|605E 0 i16 ro 2|6060 0 i8 rw 1|6061 0 i8 ro 1|6062 0 i32 ro *
+6064 0 i32 ro *|6065 0 u32 ro FFFFFFFF|6066 0 u16 ro 0|6067 0 u32 ro FFFFFFFF|6068 0 u16 ro 0|606C 0 i32 ro *
+6077 0 i16 ro *|607A 0 i32 rw 0|607D 1 i32 rw 0|607D 2 i32 rw 7A120|607F 0 u32 ro 7A120|6081 0 u32 rw 7A120
+6083 0 u32 ro 4C4B40|6084 0 u32 ro 4C4B40|6085 0 u32 ro 4C4B40|6098 0 i8 ro -1|60F4 0 i32 ro *|60FF 0 i32 rw 0
+6502 0 u32 ro 25|1400 1 u32 rw 205|1401 1 u32 rw 305|1800 1 u32 rw 185|1801 1 u32 rw 285|1600 1 u32 rw 60400010
+1600 2 u32 rw 607A0020|1601 1 u32 rw 60600008|1A00 1 u32 rw 60410010|1A00 2 u32 rw 60640020|1A01 2 u32 rw 606C0020
+2000 1 u32 ro *|2000 2 i32 ro *|2000 3 u8 ro 2|2000 4 u16 ro 0
+"""
+"""Index, part, type, access and default of each object, in hexadecimal; * where it shows how the axis is."""
+
+
+def test_18_objects(still):
+    canopen = pytest.importorskip("canopen")
+    with drive_on_virtual(still, "eighteen") as (_, network, sheet):
+        node = canopen.RemoteNode(5, sheet)
+        network.add_node(node)
+        rows = [row.split() for row in TABLE.replace("\n", "|").split("|") if row]
+        for index_, part_, kind, access, default in rows:
+            index, part, size = int(index_, 16), int(part_), int(kind[1:]) // 8
+            data = node.sdo.upload(index, part)
+            assert len(data) == size, index_
+            if default != "*":
+                assert int.from_bytes(data, "little", signed=kind[0] == "i") == int(default, 16), (index_, part_)
+            codes: list[int] = []
+            for wrong in (data, data + b"\0"):
+                try:
+                    node.sdo.download(index, part, wrong)
+                except canopen.SdoAbortedError as error:
+                    codes.append(error.code)
+            read_only = [0x06010002, 0x06010002]
+            assert codes == (read_only if access == "ro" else [0x06070010]), (index_, codes)
+        for index, part, value, code in (
+            (0x5FFF, 0, 1, 0x06020000), (0x1018, 9, 1, 0x06090011), (0x6060, 0, 8, 0x06090030),
+            (0x607D, 2, 500_001, 0x06090031), (0x6081, 0, 500_001, 0x06090031), (0x6007, 0, 9, 0x06090030),
+        ):  # fmt: skip
+            size = {0x6060: 1, 0x6007: 2}.get(index, 4)
+            with pytest.raises(canopen.SdoAbortedError) as refused:
+                node.sdo.download(index, part, value.to_bytes(size, "little"))
+            assert refused.value.code == code, hex(index)
 
 
 # ---- rules for all

@@ -337,6 +337,11 @@ class Desk:
             self._services.append(service)
         return service
 
+    def close(self) -> None:
+        """Leave the axis."""
+        for service in self._services:
+            service.close()
+
     def keep(self, task: "asyncio.Future[Any]") -> None:
         """Work that a face cannot do without: its end is that of the face."""
         self._tasks.append(task)
