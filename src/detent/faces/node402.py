@@ -29,6 +29,7 @@ TOO_LARGE, OTHER_VALUE = 0x06090031, 0x06090030
 ERRORS = {1: 0x7305, 10: 0x8611, 11: 0x8400, 12: 0x7121, 20: 0x2310, 21: 0x2350, 30: 0x8612, 40: 0x7500, 50: 0x6100}
 """Error codes (603F) of the table of faults; others are the manufacturer's, 0xFF00 and the number of the fault."""
 SAMPLE = 0x2000  # object: number of the period of what is shown, trust, fault
+EVENT = 20  # between two process data that no SYNC asks for [ms]
 LOOK = 0.01  # how often the master is looked after [s]
 
 
@@ -75,6 +76,7 @@ def records_of(axis: AxisService, node: int) -> dict[tuple[int, str], tuple[c.En
             (place, f"{kind} {number} communication parameter"): (
                 e(1, f"{kind} {number} COB-ID", UNSIGNED32, "rw", identifier),
                 e(2, f"{kind} {number} transmission type", UNSIGNED8, "rw", 255),
+                *(() if receive else (e(5, f"{kind} {number} event timer", UNSIGNED16, "ro", EVENT),)),
             ),
             (place + 0x200, f"{kind} {number} mapping parameter"): tuple(
                 e(k, f"{kind} {number} map {k}", UNSIGNED32, "rw", word)
@@ -119,7 +121,6 @@ class Node:
         self._limited = self._homing = self._homed = self._home_failed = False
         self._heard, self._limit, self._master = 0.0, 0.0, 0
         self._motion: asyncio.Future[None] | None = None
-        self._sent: dict[int, bytes] = {}
         self.node.add_read_callback(self._read)
         self.node.add_write_callback(self._written)
         axis.subscribe(self.publish)
@@ -153,18 +154,16 @@ class Node:
                 continue  # what an SDO would be told is not told to process data
 
     def publish(self, synchronised: bool = False) -> None:  # noqa: FBT001, FBT002 - as it is called
-        """Send process data that have changed, and a fault that has come or gone."""
+        """Send process data, and a fault that has come or gone; without a SYNC for every sample that is shown."""
         self._tell_fault()
         if self.node.nmt.state != "OPERATIONAL":
             return
-        for number, one in self.node.tpdo.items():
+        for one in self.node.tpdo.values():
             if not one.enabled or (one.trans_type < 254) != synchronised:
                 continue
             for variable in one:
                 variable.data = self.node.get_data(variable.index, variable.subindex)
-            if synchronised or self._sent.get(number) != bytes(one.data):
-                self._sent[number] = bytes(one.data)
-                one.transmit()
+            one.transmit()
 
     def _tell_fault(self) -> None:
         code = self.error

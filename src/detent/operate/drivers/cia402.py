@@ -151,7 +151,7 @@ def dictionary_of(
         is_map = index & ~0xFF in (0x1600, 0x1A00)
         record: Any = (ODArray if index == CONSUMER or is_map else ODRecord)(name, index)
         access = "rw" if is_map else "ro"
-        record.add_member(_variable(Entry(0, "Number of entries", UNSIGNED8, access, len(parts)), index))
+        record.add_member(_variable(Entry(0, "Number of entries", UNSIGNED8, access, parts[-1].place), index))
         for entry in parts:
             record.add_member(_variable(entry, index, entry.place))
         made.add_object(record)
