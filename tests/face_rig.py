@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.live_processes import STARTED, Running
 
 import detent
+from tests.live_processes import STARTED, Running
 
 PERIOD = "10 ms"  # of the loop: this machine has no real-time priority, and two processors for all
 

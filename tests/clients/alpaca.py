@@ -56,7 +56,12 @@ def rest():
 
 
 if kind == "focuser":
-    found |= {"absolute": device.Absolute, "max": device.MaxStep, "size": device.StepSize, "comp": device.TempCompAvailable}
+    found |= {
+        "absolute": device.Absolute,
+        "max": device.MaxStep,
+        "size": device.StepSize,
+        "comp": device.TempCompAvailable,
+    }
     device.Move(70_000)
     found["moving"] = device.IsMoving
     rest()

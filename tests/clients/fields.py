@@ -22,5 +22,7 @@ for field, pv in pvs.items():
         found["pyepics"][field] = pv.type.replace("time_", "").replace("ctrl_", "")
         if pv.get() is None:
             found["none"].append(field)
-found["extras"] = {extra: epics.caget(f"{name}:{extra}", as_string=True) for extra in ("trust", "state", "fault_text", "sample")}
+found["extras"] = {
+    extra: epics.caget(f"{name}:{extra}", as_string=True) for extra in ("trust", "state", "fault_text", "sample")
+}
 print(json.dumps(found))

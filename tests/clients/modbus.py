@@ -39,7 +39,7 @@ def command(number, target=0, speed=0, silent=False, wait=True):
     if not silent:
         heart()
     write(46, sequence)
-    while wait and (read(23), read(24)) in [(sequence, 1)] or (wait and read(23) != sequence):
+    while wait and (read(23) != sequence or read(24) == 1):
         if not silent:
             heart()
     return read(24), read(25)

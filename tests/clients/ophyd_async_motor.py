@@ -31,7 +31,7 @@ async def moves():
         found["limit"] = type(error).__name__
     try:
         await motor.set(400.0, timeout=0.1)
-    except (TimeoutError, asyncio.TimeoutError) as error:
+    except TimeoutError as error:
         found["timeout"] = type(error).__name__
     await motor.stop(success=True)
     await asyncio.sleep(0.5)

@@ -4,7 +4,6 @@ import json
 import sys
 import time
 
-import can
 import canopen
 from canopen.profiles.p402 import BaseNode402
 
@@ -22,6 +21,7 @@ def until(met, what):
 def patient(node):
     """The library gives a drive 0.4 s a step, of a processor that others use as well."""
     node.TIMEOUT_SWITCH_STATE_SINGLE, node.TIMEOUT_SWITCH_STATE_FINAL, node.TIMEOUT_SWITCH_OP_MODE = 3.0, 12.0, 3.0
+    node.TIMEOUT_CHECK_TPDO = 2.0
     return node
 
 

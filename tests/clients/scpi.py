@@ -33,7 +33,16 @@ while not int(ask("*ESR?")) & 1:
 found["by"] = float(ask("POS?"))
 tell("MOVE:ABS 300;MOVE:ABS 61")
 found["second"] = ask("*OPC?;POS?")
-for nonsense in ("FOO", "MOVE:ABS", "MOVE:ABS x", "MOVE:ABS 1,2,3", "MOVE:ABS 10000", "*ESE 999", "\xff\x00", "MOVE:ABS 60,1e9"):
+for nonsense in (
+    "FOO",
+    "MOVE:ABS",
+    "MOVE:ABS x",
+    "MOVE:ABS 1,2,3",
+    "MOVE:ABS 10000",
+    "*ESE 999",
+    "\xff\x00",
+    "MOVE:ABS 60,1e9",
+):
     resource.write_raw(nonsense.encode("latin-1") + b"\n")
 found["status"] = int(ask("*STB?"))
 found["errors"] = []

@@ -19,7 +19,11 @@ with Connection.open_tcp("127.0.0.1", int(sys.argv[1])) as connection:
         return ""
 
     if "refused" in sys.argv:
-        found |= {"home": refusal_of(axis.home), "move": refusal_of(axis.move_absolute, 1000), "stop": refusal_of(axis.stop)}
+        found |= {
+            "home": refusal_of(axis.home),
+            "move": refusal_of(axis.move_absolute, 1000),
+            "stop": refusal_of(axis.stop),
+        }
         print(json.dumps(found))
         sys.exit()
     axis.home()

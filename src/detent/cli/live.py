@@ -75,7 +75,9 @@ def live(
     scpi: Annotated[str, option("--scpi", "[HOST]:PORT", SCPI)] = "",
     grbl: Annotated[str, option("--grbl", "[HOST]:PORT", "Be a grbl 1.1; the same places.")] = "",
     gcs: Annotated[str, option("--gcs", "[HOST]:PORT", "Speak GCS 2.0 as PI's controllers do; the same.")] = "",
-    zaber: Annotated[str, option("--zaber", "[HOST]:PORT", "Speak Zaber's ASCII protocol, native units; the same.")] = "",
+    zaber: Annotated[
+        str, option("--zaber", "[HOST]:PORT", "Speak Zaber's ASCII protocol, native units; the same.")
+    ] = "",
     alpaca: Annotated[str, option("--alpaca", "[HOST]:PORT", "Be an ASCOM Alpaca focuser or rotator.")] = "",
     commands: Annotated[bool, option("--commands", "", COMMANDS)] = False,
     *,
@@ -159,7 +161,7 @@ def _faces(file: Path, overrides: list[str], asked: dict[str, str], *, commands:
 def _mend(panel: Any, watchdog: Any, faces: Any, *, quiet: bool) -> None:
     """Start again what has died beside the loop."""
     told = [panel.mend()] if panel else []
-    told += faces.mend()
+    told += list[str](faces.mend())
     told += ["The watchdog had ended; another one watches now."] if watchdog.keep() else []
     for one in filter(None, () if quiet else told):
         tell(one)

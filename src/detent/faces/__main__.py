@@ -20,7 +20,9 @@ async def run(told: dict[str, Any]) -> None:
         serve = import_module(f"detent.faces.{FACES[told['face']].module}").serve
         places = await serve(desk, told["address"])
     except ImportError as error:
-        return tell(error=f"{error.name} is not installed; install it with: pip install 'detent[{FACES[told['face']].extra}]'")
+        return tell(
+            error=f"{error.name} is not installed; install it with: pip install 'detent[{FACES[told['face']].extra}]'"
+        )
     except OSError as error:
         return tell(error=f"{told['address'] or 'its place'}: {error.strerror or error}")
     except DetentError as error:

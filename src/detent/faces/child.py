@@ -65,7 +65,9 @@ class Faces:
         answer: dict[str, Any] = json.loads(process.stdout.readline() or "{}")
         if "places" not in answer:
             why = answer.get("error", "its process ended")
-            raise AxisError(f"--{face}: the face did not start ({why}); mend that, choose another place, or do without it")
+            raise AxisError(
+                f"--{face}: the face did not start ({why}); mend that, choose another place, or do without it"
+            )
         self.places[face] = answer["places"]
         listens = [place for place in answer["places"] if "::" not in place and place.rpartition(":")[2].isdigit()]
         if listens and self._addresses[face].endswith(":0"):

@@ -1,4 +1,4 @@
-"""The motor record over Channel Access, by caproto: all fields that a motor record has, of which those of `motor` live."""
+"""The motor record over Channel Access, by caproto: all of its fields, of which those of `motor` live."""
 
 import asyncio
 import logging
@@ -6,6 +6,8 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# caproto has no types for its properties.
 from caproto import AlarmSeverity, AlarmStatus
 from caproto.asyncio.server import Context
 from caproto.server import PVGroup, pvproperty
@@ -97,9 +99,7 @@ class Served:
             while self._refused:
                 await self._refused.pop().alarm.write(severity=AlarmSeverity.NO_ALARM, status=AlarmStatus.NO_ALARM)
             if self.value.alarm.severity != motor.severity:
-                await self.value.alarm.write(
-                    severity=AlarmSeverity(motor.severity), status=AlarmStatus(motor.status)
-                )
+                await self.value.alarm.write(severity=AlarmSeverity(motor.severity), status=AlarmStatus(motor.status))
             await asyncio.sleep(SHOWN)
 
 
@@ -121,7 +121,7 @@ async def serve(desk: Desk, address: str) -> list[str]:
     context = Context(served.group.pvdb, [host])
     for work in (context.run(), motor.follow(), served.follow(motor)):
         desk.keep(asyncio.ensure_future(work))
-    while not context.port:
+    while not context.port:  # noqa: ASYNC110 - caproto tells it nobody
         await asyncio.sleep(0.01)
     return [
         name, f"EPICS_CA_ADDR_LIST={host} EPICS_CA_AUTO_ADDR_LIST=NO EPICS_CA_SERVER_PORT={port}",

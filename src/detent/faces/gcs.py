@@ -30,12 +30,12 @@ class Gcs(Talk):
 
     def __init__(self, axis: AxisService, send: Send) -> None:
         super().__init__(axis, send)
-        self._error, self._speed = 0, axis.speed
+        self.number, self.speed = 0, axis.speed
         self._begun: asyncio.Future[None] | None = None
 
     def stops(self, line: str) -> bool:
         """STP and HLT overtake."""
-        return line.split(" ")[0].upper() in ("STP", "HLT")
+        return line.partition(" ")[0].upper() in ("STP", "HLT")
 
     def urgent(self, byte: int) -> bool:
         """Single characters: is it moving, is it ready, its status, stop."""
@@ -74,11 +74,11 @@ class Gcs(Talk):
             await self.axis.refresh()
             told = await handler(self, values)
         except GcsError as error:
-            self._error = error.code
+            self.number = error.code
         except NotDoneError as error:
-            self._error = IN_ERRORS.get(error.code, error.code if error.code > 1000 else UNMOVABLE)
+            self.number = IN_ERRORS.get(error.code, error.code if error.code > 1000 else UNMOVABLE)
         except (DetentError, ValueError):
-            self._error = SYNTAX
+            self.number = SYNTAX
         else:
             if told is not None:
                 lines = told.split("\n")
@@ -107,7 +107,7 @@ class Gcs(Talk):
         """Begin a motion: GCS waits for none."""
         if not self.axis.enabled:
             raise GcsError(UNMOVABLE)
-        ending = await self.axis.start(word, value, self.axis.share(self._speed))
+        ending = await self.axis.start(word, value, self.axis.share(self.speed))
         self._begun = asyncio.ensure_future(self._end(word, ending))
 
     async def _end(self, word: str, ending: "asyncio.Future[dict[str, Any]]") -> None:
@@ -115,7 +115,7 @@ class Gcs(Talk):
             await self.axis.ended(word, ending)
         except NotDoneError as error:
             if error.how != "aborted":
-                self._error = IN_ERRORS.get(error.code, UNMOVABLE)
+                self.number = IN_ERRORS.get(error.code, UNMOVABLE)
 
 
 Handler = Callable[[Gcs, list[str]], Awaitable[str | None]]
@@ -185,12 +185,14 @@ async def _(_talk: Gcs, _values: list[str]) -> str:
 
 @command("HLP?", "get list of available commands")
 async def _(_talk: Gcs, _values: list[str]) -> str:
-    return "\n".join(["The following commands are valid:", *(f"{word} {told}" for word, told in HELP.items()), "end of help"])
+    return "\n".join(
+        ["The following commands are valid:", *(f"{word} {told}" for word, told in HELP.items()), "end of help"]
+    )
 
 
 @command("ERR?", "get error number")
 async def _(talk: Gcs, _values: list[str]) -> str:
-    error, talk._error = talk._error, 0  # noqa: SLF001 - declared beside its class
+    error, talk.number = talk.number, 0
     return str(error)
 
 
@@ -220,12 +222,12 @@ async def _(talk: Gcs, values: list[str]) -> None:
     speed = talk.pairs(values)
     if not 0.0 < speed <= talk.axis.speed * (1 + 1e-9):
         raise GcsError(TOO_FAST)
-    talk._speed = speed  # noqa: SLF001 - declared beside its class
+    talk.speed = speed
 
 
 @command("VEL?", "get closed-loop velocity")
 async def _(talk: Gcs, values: list[str]) -> str:
-    return talk.shown(values, talk._speed)  # noqa: SLF001 - declared beside its class
+    return talk.shown(values, talk.speed)
 
 
 @command("FRF", "start reference move to reference switch")
@@ -240,7 +242,7 @@ async def _(talk: Gcs, values: list[str]) -> None:
 
 @command("STP", "stop all axes abruptly")
 async def _(talk: Gcs, _values: list[str]) -> None:
-    talk._error = STOPPED  # noqa: SLF001 - at once: who asks for it does not wait for rest
+    talk.number = STOPPED  # at once: who asks for it does not wait for rest
     await talk.axis.stop()
     talk.axis.target = talk.axis.commanded
 

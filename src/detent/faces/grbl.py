@@ -8,8 +8,9 @@ import asyncio
 import math
 import re
 from collections import deque
+from collections.abc import Coroutine
 from contextlib import suppress
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from detent.errors import DetentError
 from detent.faces.service import READ_ONLY, AxisService, Desk, NotDoneError
@@ -82,7 +83,7 @@ class Machine:
 
     async def rest(self) -> None:
         """Wait until all is done."""
-        while self.busy and not self.alarm:
+        while self.busy and not self.alarm:  # noqa: ASYNC110 - either of two, which others change
             await asyncio.sleep(0.01)
 
     async def _work(self) -> None:
@@ -181,8 +182,8 @@ class Grbl(Talk):
             return False
         return True
 
-    def _later(self, work: "asyncio.Future[None] | object") -> None:
-        task: asyncio.Future[None] = asyncio.ensure_future(work)  # type: ignore[arg-type]
+    def _later(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
@@ -207,10 +208,9 @@ class Grbl(Talk):
         speed = math.hypot(*(axis.velocity for axis in machine.axes)) * 60
         sample = self.axis.sample
         # The last field is no word of grbl's own; senders pass over those that they do not know.
-        return (
-            f"<{machine.state}|MPos:{shown}|Bf:{PLANNED - len(machine.blocks)},128|FS:{speed:.0f},0|WCO:0.000,0.000,0.000"
-            f"|Dt:{sample}>"
-        )
+        room = PLANNED - len(machine.blocks)
+        known = f"<{machine.state}|MPos:{shown}|Bf:{room},128|FS:{speed:.0f},0|WCO:0.000,0.000,0.000"
+        return f"{known}|Dt:{sample}>"
 
     # ---- lines
 
@@ -254,7 +254,11 @@ class Grbl(Talk):
 
     def settings(self) -> list[tuple[int, str]]:
         """Settings of grbl, read from the axes: steps per mm, largest rate, acceleration, travel."""
-        found = [(10, "1"), (20, "1" if self.axis.limits else "0"), (22, str(int("home" in self.axis.about["commands"])))]
+        found = [
+            (10, "1"),
+            (20, "1" if self.axis.limits else "0"),
+            (22, str(int("home" in self.axis.about["commands"]))),
+        ]
         for k, axis in enumerate(self.machine.axes):
             low, high = axis.limits or (0.0, 0.0)
             found += [

@@ -21,7 +21,21 @@ from detent.faces.service import AxisService, Desk, NotDoneError, address_of
 PORT = 502
 SILENCE = 0.7  # without a new heartbeat for so long, what was commanded here is stopped [s]
 LOOK = 0.05  # how often that is looked at [s]
-COMMANDS = ("", "enable", "disable", "stop", "reset", "confirm", "home", "move_to", "move_by", "jog", "keep", "take", "leave")
+COMMANDS = (
+    "",
+    "enable",
+    "disable",
+    "stop",
+    "reset",
+    "confirm",
+    "home",
+    "move_to",
+    "move_by",
+    "jog",
+    "keep",
+    "take",
+    "leave",
+)
 """By their numbers in the command register."""
 STATES = (
     "not ready to switch on", "switch on disabled", "ready to switch on", "switched on", "operation enabled",
@@ -48,7 +62,8 @@ REGISTERS = (
     Register(2, 2, "nanometres, or microdegrees, in a count"), Register(4, 2, "lower limit [count]"),
     Register(6, 2, "upper limit [count]"), Register(8, 2, "largest speed [count/s]"),
     Register(10, 2, "number of the period of all that follows, up to 25"), Register(12, 1, "status bits, see below"),
-    Register(13, 1, "state, 0 to 7 as CiA 402 numbers it"), Register(14, 1, "trust: 0 unknown, 1 restored, 2 referenced"),
+    Register(13, 1, "state, 0 to 7 as CiA 402 numbers it"),
+    Register(14, 1, "trust: 0 unknown, 1 restored, 2 referenced"),
     Register(15, 1, "fault, 0 none"), Register(16, 2, "position [count]"), Register(18, 2, "velocity [count/s]"),
     Register(20, 2, "commanded position [count]"), Register(22, 1, "effort [0.1 %]"),
     Register(23, 1, "sequence number that was acknowledged"),
@@ -105,11 +120,13 @@ class Slave:
         axis, s = self.axis, self.axis.status
         low, high = axis.limits or (axis.from_counts(-(1 << 31)), axis.from_counts((1 << 31) - 1))
         self.shown[:FIRST_WRITABLE] = [
-            0x4454, 1, *words_of(round(axis.count * 1e6)), *words_of(axis.to_counts(low)), *words_of(axis.to_counts(high)),
-            *words_of(round(axis.speed / axis.count)), *words_of(s["loop"]["periods"] & 0xFFFFFFFF), self.status_bits(),
+            0x4454, 1, *words_of(round(axis.count * 1e6)), *words_of(axis.to_counts(low)),
+            *words_of(axis.to_counts(high)), *words_of(round(axis.speed / axis.count)),
+            *words_of(s["loop"]["periods"] & 0xFFFFFFFF), self.status_bits(),
             STATES.index(s["state"]), TRUSTS.index(s["trust"]), axis.fault, *words_of(axis.counts),
             *words_of(round(axis.velocity / axis.count)), *words_of(axis.to_counts(axis.commanded)),
-            round(min(max(s["effort"] or 0.0, -10.0), 10.0) * 1000) & 0xFFFF, self._sequence, self._result, self._reason,
+            round(min(max(s["effort"] or 0.0, -10.0), 10.0) * 1000) & 0xFFFF, self._sequence, self._result,
+            self._reason,
             *[0] * (FIRST_WRITABLE - 26),
         ]  # fmt: skip
         return self.shown

@@ -1,7 +1,7 @@
-"""The motor record of EPICS on an axis: its live fields, what a put to each of them does, whatever carries them.
+"""The motor record of EPICS on an axis: its live fields, and what a put to each of them does, whatever carries it.
 
-User and dial coordinates are those of the record: user = DIR * dial + OFF; the axis has the dial. Raw values are counts.
-A field that is not among those here has its default, and nothing reads it.
+User and dial coordinates are those of the record: user = DIR * dial + OFF; the axis has the dial. Raw values are
+counts. A field that is not among those here has its default, and nothing reads it.
 """
 
 import asyncio
@@ -29,8 +29,8 @@ class Motor:
         rate = axis.about["acceleration"]
         self._rate: float = rate * axis.scale if rate else 0.0  # acceleration of the axis; 0 where it does not say
         self.fields: dict[str, Any] = {
-            "VAL": axis.commanded, "RLV": 0.0, "TWV": 1.0, "TWF": 0, "TWR": 0, "JOGF": 0, "JOGR": 0, "HOMF": 0, "HOMR": 0,
-            "STOP": 0, "SPMG": GO, "DMOV": 1, "MOVN": 0, "MIP": 0, "SET": 0, "FOFF": 0, "OFF": 0.0, "DIR": 0,
+            "VAL": axis.commanded, "RLV": 0.0, "TWV": 1.0, "TWF": 0, "TWR": 0, "JOGF": 0, "JOGR": 0, "HOMF": 0,
+            "HOMR": 0, "STOP": 0, "SPMG": GO, "DMOV": 1, "MOVN": 0, "MIP": 0, "SET": 0, "FOFF": 0, "OFF": 0.0, "DIR": 0,
             "VELO": axis.speed, "VMAX": axis.speed, "VBAS": 0.0, "JVEL": axis.speed / 4, "HVEL": axis.speed / 10,
             "DHLM": high, "DLLM": low, "HLM": high, "LLM": low, "LVIO": 0, "MRES": axis.count, "ERES": axis.count,
             "EGU": axis.unit, "PREC": 4, "CNEN": 0, "RDBD": axis.count, "LSPG": GO,
@@ -94,9 +94,9 @@ class Motor:
             at = "LLS" if at == "HLS" else "HLS"
         forward = axis.velocity * self._sign > 0 if moving else bool(f.get("TDIR", 0))
         status = (
-            POSITIVE * forward | DONE * (not moving) | AT_PLUS * (at == "HLS") | AT_MINUS * (at == "LLS") | HAS_ENCODER
-            | AT_POSITION * axis.enabled | SLIP * (axis.fault in (10, 12)) | PROBLEM * bool(axis.fault) | MOVING * moving
-            | HOMED * axis.homed
+            POSITIVE * forward | DONE * (not moving) | AT_PLUS * (at == "HLS") | AT_MINUS * (at == "LLS")
+            | HAS_ENCODER | AT_POSITION * axis.enabled | SLIP * (axis.fault in (10, 12)) | PROBLEM * bool(axis.fault)
+            | MOVING * moving | HOMED * axis.homed
         )  # fmt: skip
         return {
             "RBV": self.user(dial), "DRBV": dial, "RRBV": axis.counts, "REP": axis.counts, "RMP": axis.counts,
@@ -162,7 +162,7 @@ class Motor:
             await self.change({"SPMG": PAUSE, "LSPG": MOVE})
 
     async def _rename(self, user: float) -> None:
-        """Calibrate: with a fixed offset the axis itself cannot be told another position, so the offset is what moves."""
+        """Calibrate: the axis itself cannot be told another position, so that the offset is what moves."""
         await self.change({"OFF": user - self._sign * self.axis.position, "VAL": user})
         await self.change(self._seen())
 
@@ -222,7 +222,7 @@ class Motor:
         self._jogging = asyncio.ensure_future(self._jog_ends(field))
 
     async def _jog_ends(self, field: str) -> None:
-        while self.axis.moving and not self.axis.gone.is_set():
+        while self.axis.moving and not self.axis.gone.is_set():  # noqa: ASYNC110 - either of two
             await asyncio.sleep(0.02)
         self._jogs = False
         await self.axis.give_back()
@@ -286,7 +286,8 @@ class Motor:
         axis = self.axis
         return {
             "trust": axis.status["trust"], "state": axis.status["state"], "fault": axis.fault,
-            "fault_text": axis.fault_text[:200], "sample": str(axis.sample), "effort": float(axis.status["effort"] or 0.0),
+            "fault_text": axis.fault_text[:200], "sample": str(axis.sample),
+            "effort": float(axis.status["effort"] or 0.0),
         }  # fmt: skip
 
 

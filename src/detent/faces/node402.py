@@ -6,6 +6,7 @@ a thread of python-can; what it writes is done in the order in which it came, in
 
 import asyncio
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,8 @@ def objects_of(axis: AxisService) -> tuple[c.Entry, ...]:
     # fmt: off
     return (
         e(0x1000, "Device type", UNSIGNED32, "ro", 0x00020192), e(0x1001, "Error register", UNSIGNED8, "ro"),
-        e(0x1017, "Producer heartbeat time", UNSIGNED16), e(c.ABORT, "Abort connection option code", INTEGER16, "rw", 3),
+        e(0x1017, "Producer heartbeat time", UNSIGNED16),
+        e(c.ABORT, "Abort connection option code", INTEGER16, "rw", 3),
         e(c.ERROR_CODE, "Error code", UNSIGNED16, "ro"), e(c.CONTROL, "Controlword", UNSIGNED16),
         e(c.STATUS, "Statusword", UNSIGNED16, "ro"),
         e(c.QUICK_STOP_OPTION, "Quick stop option code", INTEGER16, "ro", 6),
@@ -54,7 +56,8 @@ def objects_of(axis: AxisService) -> tuple[c.Entry, ...]:
         e(0x6068, "Position window time", UNSIGNED16, "ro"), e(0x606C, "Velocity actual value", INTEGER32, "ro"),
         e(c.TORQUE_SHOWN, "Torque actual value", INTEGER16, "ro"), e(c.PLACE, "Target position", INTEGER32),
         e(0x607F, "Max profile velocity", UNSIGNED32, "ro", speed),
-        e(0x6081, "Profile velocity", UNSIGNED32, "rw", speed), e(0x6083, "Profile acceleration", UNSIGNED32, "ro", ramp),
+        e(0x6081, "Profile velocity", UNSIGNED32, "rw", speed),
+        e(0x6083, "Profile acceleration", UNSIGNED32, "ro", ramp),
         e(0x6084, "Profile deceleration", UNSIGNED32, "ro", ramp),
         e(0x6085, "Quick stop deceleration", UNSIGNED32, "ro", ramp),
         e(0x6098, "Homing method", INTEGER8, "ro", -1), e(0x60F4, "Following error actual value", INTEGER32, "ro"),
@@ -68,8 +71,9 @@ def records_of(axis: AxisService, node: int) -> dict[tuple[int, str], tuple[c.En
     e = c.Entry
     low, high = axis.limits or (axis.from_counts(-(1 << 31)), axis.from_counts((1 << 31) - 1))
 
-    def process_data(receive: bool, number: int, *mapped: int) -> dict[tuple[int, str], tuple[c.Entry, ...]]:  # noqa: FBT001
-        kind, base = ("RPDO", 0x200) if receive else ("TPDO", 0x180)
+    def process_data(kind: str, number: int, *mapped: int) -> dict[tuple[int, str], tuple[c.Entry, ...]]:
+        receive = kind == "RPDO"
+        base = 0x200 if receive else 0x180
         place = (0x1400 if receive else 0x1800) + number - 1
         identifier = base + (number - 1) * 0x100 + node
         return {
@@ -99,10 +103,10 @@ def records_of(axis: AxisService, node: int) -> dict[tuple[int, str], tuple[c.En
             e(1, "Min position limit", INTEGER32, "rw", axis.to_counts(low)),
             e(2, "Max position limit", INTEGER32, "rw", axis.to_counts(high)),
         ),
-        **process_data(True, 1, control, c.PLACE << 16 | 32),
-        **process_data(True, 2, c.MODE << 16 | 8, c.VELOCITY << 16 | 32),
-        **process_data(False, 1, status, c.POSITION << 16 | 32),
-        **process_data(False, 2, c.MODE_SHOWN << 16 | 8, 0x606C << 16 | 32),
+        **process_data("RPDO", 1, control, c.PLACE << 16 | 32),
+        **process_data("RPDO", 2, c.MODE << 16 | 8, c.VELOCITY << 16 | 32),
+        **process_data("TPDO", 1, status, c.POSITION << 16 | 32),
+        **process_data("TPDO", 2, c.MODE_SHOWN << 16 | 8, 0x606C << 16 | 32),
     }  # fmt: skip
 
 
@@ -112,7 +116,8 @@ class Node:
     def __init__(self, axis: AxisService, node: int) -> None:
         self.axis, self._loop = axis, asyncio.get_running_loop()
         dictionary = c.dictionary_of(node, objects_of(axis), records_of(axis, node))
-        for parts in (dictionary[place] for place in (0x1600, 0x1601, 0x1A00, 0x1A01)):
+        maps: Any = dictionary
+        for parts in (maps[place] for place in (0x1600, 0x1601, 0x1A00, 0x1A01)):
             parts[0].default = sum(1 for k in range(1, 5) if parts[k].default)
         self.node: Any = canopen.LocalNode(node, dictionary)
         self.set_points = SetPoints(axis.counts)
@@ -131,7 +136,7 @@ class Node:
         """Be a node of a network."""
         network[self.node.id] = self.node
         self._listen()
-        network.subscribe(c.SYNC, lambda *_: self._loop.call_soon_threadsafe(self.publish, True))
+        network.subscribe(c.SYNC, self._sync)
         self.node.nmt.send_command(0)
         self.node.nmt.send_command(128)
 
@@ -153,7 +158,10 @@ class Node:
             except canopen.SdoAbortedError:
                 continue  # what an SDO would be told is not told to process data
 
-    def publish(self, synchronised: bool = False) -> None:  # noqa: FBT001, FBT002 - as it is called
+    def _sync(self, *_: object) -> None:
+        self._loop.call_soon_threadsafe(partial(self.publish, synchronised=True))
+
+    def publish(self, *, synchronised: bool = False) -> None:
         """Send process data, and a fault that has come or gone; without a SYNC for every sample that is shown."""
         self._tell_fault()
         if self.node.nmt.state != "OPERATIONAL":
@@ -219,7 +227,8 @@ class Node:
         shown = {
             c.STATUS: self.status, c.POSITION: lambda: word(axis.counts), c.ERROR_CODE: lambda: self.error,
             c.MODE_SHOWN: lambda: self._mode, 0x1001: self._register,
-            0x6062: lambda: word(axis.to_counts(axis.commanded)), 0x606C: lambda: word(round(axis.velocity / axis.count)),
+            0x6062: lambda: word(axis.to_counts(axis.commanded)),
+            0x606C: lambda: word(round(axis.velocity / axis.count)),
             0x60F4: lambda: word(round(axis.in_user_units(axis.status["error"]) / axis.count)),
             c.TORQUE_SHOWN: lambda: round(min(max(axis.status["effort"] or 0.0, -30.0), 30.0) * 1000),
         }.get(index)  # fmt: skip

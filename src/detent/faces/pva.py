@@ -5,6 +5,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+# pyright: reportUnknownMemberType=false, reportArgumentType=false
+# p4p has no types.
 from p4p.nt import NTEnum, NTScalar
 from p4p.server import Server, StaticProvider
 from p4p.server.asyncio import SharedPV
@@ -15,7 +17,8 @@ from detent.faces.service import Desk
 
 PORT = 5075
 MENUS = {
-    "SPMG": ["Stop", "Pause", "Move", "Go"], "DIR": ["Pos", "Neg"], "SET": ["Use", "Set"], "CNEN": ["Disable", "Enable"],
+    "SPMG": ["Stop", "Pause", "Move", "Go"], "DIR": ["Pos", "Neg"], "SET": ["Use", "Set"],
+    "CNEN": ["Disable", "Enable"],
     "FOFF": ["Variable", "Frozen"], "LSPG": ["Stop", "Pause", "Move", "Go"],
 }  # fmt: skip
 TYPES = {int: "i", float: "d", str: "s"}
@@ -112,7 +115,8 @@ async def serve(desk: Desk, address: str) -> list[str]:
     motor = Motor(axis, served.show)
     served.open(motor)
     conf = {
-        "EPICS_PVAS_INTF_ADDR_LIST": host, "EPICS_PVAS_SERVER_PORT": str(port), "EPICS_PVAS_BROADCAST_PORT": str(port + 1),
+        "EPICS_PVAS_INTF_ADDR_LIST": host, "EPICS_PVAS_SERVER_PORT": str(port),
+        "EPICS_PVAS_BROADCAST_PORT": str(port + 1),
         "EPICS_PVAS_AUTO_BEACON_ADDR_LIST": "NO", "EPICS_PVAS_BEACON_ADDR_LIST": host,
     }  # fmt: skip
     desk.server = Server(providers=[served.provider], conf=conf, useenv=False)

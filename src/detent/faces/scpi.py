@@ -69,7 +69,7 @@ class Scpi(Talk):
     def __init__(self, axis: AxisService, send: Send) -> None:
         super().__init__(axis, send)
         self._errors: deque[tuple[int, str]] = deque()
-        self._events, self._enabled_events, self._service = POWER_ON, 0, 0
+        self._events, self.enabled_events, self.service = POWER_ON, 0, 0
         self._pending: set[asyncio.Future[None]] = set()
         self._tell_complete = False
 
@@ -179,7 +179,7 @@ class Scpi(Talk):
 
     def status_byte(self) -> int:
         """The status byte: errors wait, or an event that is enabled has come."""
-        return QUEUE * bool(self._errors) | EVENTS * bool(self._events & self._enabled_events)
+        return QUEUE * bool(self._errors) | EVENTS * bool(self._events & self.enabled_events)
 
     def complete_later(self) -> None:
         """Set the bit once all has ended."""
@@ -220,22 +220,22 @@ async def _(talk: Scpi, _values: list[str]) -> str:
 
 @command("*ESE", "events that show in the status byte", 1)
 async def _(talk: Scpi, values: list[str]) -> None:
-    talk.mask(values[0], "_enabled_events")
+    talk.mask(values[0], "enabled_events")
 
 
 @command("*ESE?", "which these are")
 async def _(talk: Scpi, _values: list[str]) -> str:
-    return str(talk._enabled_events)  # noqa: SLF001 - declared beside its class
+    return str(talk.enabled_events)
 
 
 @command("*SRE", "bits of the status byte that ask for service; nobody is asked", 1)
 async def _(talk: Scpi, values: list[str]) -> None:
-    talk.mask(values[0], "_service")
+    talk.mask(values[0], "service")
 
 
 @command("*SRE?", "which these are")
 async def _(talk: Scpi, _values: list[str]) -> str:
-    return str(talk._service)  # noqa: SLF001 - declared beside its class
+    return str(talk.service)
 
 
 @command("*STB?", "status byte: 4 errors wait, 32 an enabled event has come")

@@ -1,8 +1,8 @@
 """The hand-shake of set-points in the profile position mode of CiA 402: one that is reached for, one that waits.
 
-A set-point is taken at the rising edge of bit 4 of the control word, while bit 12 of the status word is 0. With bit 5 it
-takes the place of the one under way at once; without, it waits until that is reached, and bit 12 stays 1 for as long as
-it waits. With bit 6 it is a way from the set-point before it.
+A set-point is taken at the rising edge of bit 4 of the control word, while bit 12 of the status word is 0. With bit 5
+it takes the place of the one under way at once; without, it waits until that is reached, and bit 12 stays 1 for as
+long as it waits. With bit 6 it is a way from the set-point before it.
 """
 
 NEW, AT_ONCE, RELATIVE, HALT = 0x10, 0x20, 0x40, 0x100  # bits of the control word

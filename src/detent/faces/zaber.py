@@ -59,11 +59,11 @@ class Zaber(Talk):
         words, numbers = body.split(), list[str]()
         while words and len(numbers) < 3 and (words[0].isdigit() or words[0] == "?"):
             numbers.append(words.pop(0))
-        device, number, mark = (numbers + ["0", "0", ""])[:2] + [numbers[2] if len(numbers) > 2 else ""]
-        if int(device or 0) not in (0, 1):
+        device, number, mark = [*numbers, *("0", "0", "")[len(numbers) :]]
+        if device.isdigit() and int(device) > 1:
             return
         try:
-            if int(number or 0) not in (0, 1):
+            if not number.isdigit() or int(number) > 1:
                 raise RejectedError("BADAXIS")  # noqa: TRY301 - one place that answers
             await self.axis.refresh()
             flag, data = "OK", await self._do(words)
@@ -75,7 +75,7 @@ class Zaber(Talk):
             flag, data = "RJ", "BADDATA"
         status = "BUSY" if self.axis.moving else "IDLE"
         marked = f" {mark}" if mark else ""
-        self._tell(f"01 {number or 0}{marked} {flag} {status} {self.warning} {data}")
+        self._tell(f"01 {number}{marked} {flag} {status} {self.warning} {data}")
 
     def _tell(self, text: str) -> None:
         self.send(f"@{text}" + (f":{checksum(text):02X}" if self._checked else ""))
@@ -90,12 +90,10 @@ class Zaber(Talk):
     async def _do(self, words: list[str]) -> str:
         word, *rest = words or [""]
         axis = self.axis
-        if word == "":
-            return "0"
         if word == "home":
             await axis.enable()
             if "home" in axis.about["commands"]:
-                await self._begin("home")
+                await axis.start("home")
             else:
                 await axis.begin_move(axis.limits[0] if axis.limits else axis.origin)
         elif word == "move":
@@ -114,12 +112,9 @@ class Zaber(Talk):
             await (axis.enable() if rest == ["enable"] else axis.do("disable"))
         elif word == "detent":  # a word of its own: what every face shows alike
             return str(axis.sample).replace(" ", "_")
-        else:
+        elif word:
             raise RejectedError("BADCOMMAND")
         return "0"
-
-    async def _begin(self, word: str, value: float | None = None, speed: float = 1.0) -> None:
-        await self.axis.start(word, value, speed)
 
     async def _move(self, words: list[str]) -> None:
         axis = self.axis
