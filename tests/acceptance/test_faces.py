@@ -5,6 +5,7 @@ What each of them needs to be told is what `detent live` prints.
 
 import json
 import os
+import re
 import signal
 import socket
 import struct
@@ -21,7 +22,9 @@ import numba
 import pytest
 from tests import foreign
 from tests.face_rig import Faced, connected, drive_on_virtual, faced, family, listening, wire
+from tests.places import ROOT
 
+from detent.faces.child import FACES
 from detent.faces.set_points import SetPoints
 
 pytestmark = [
@@ -812,6 +815,38 @@ def test_29_a_second_commander_is_refused_by_each_protocol_and_may_stop(axis):
         assert (found["move"], found["stop"]) == ([4, 43], [2, 0])
         with pytest.raises(Exception, match="stop ended it"):
             moving.wait()
+
+
+PAGES = {
+    "scan-with-bluesky": ("epics",), "cia402-drive-without-hardware": ("canopen",), "modbus-hand-shake": ("modbus",),
+    "line-protocols": ("scpi", "grbl", "gcs", "zaber", "alpaca"),
+}  # fmt: skip
+"""Of each face, the page with its session."""
+
+
+def test_31_each_face_has_a_page_whose_session_the_tests_run():
+    tested = Path(__file__).read_text(encoding="utf-8")
+    assert {face for faces in PAGES.values() for face in faces} | {"pva"} == set(FACES)
+    for page, faces in PAGES.items():
+        text = (ROOT / "docs" / "how-to" / f"{page}.md").read_text(encoding="utf-8")
+        assert text.split("\n\n")[1].startswith("What ")
+        assert "cannot protect" in text or "can protect" in text
+        shown = re.findall(r"literalinclude\} \.\./\.\./tests/clients/(\w+)\.py", text)
+        assert len(shown) >= len(faces)
+        assert all(f'"{script}"' in tested or f"clients.{script} " in tested for script in shown)
+        assert all(f"--{face}" in text for face in faces)
+
+
+def test_31_a_first_scan(epics):
+    found = epics.run("epics", "first_scan", RECORD)
+    assert (found["points"], found["unit"]) == (21, "mm")
+    assert found["worst"] <= WINDOW
+
+
+def test_31_twenty_lines_of_a_plc(axis):
+    found = foreign.run("modbus", "plc", axis.port("modbus"))
+    assert (found["enable"], found["move"]) == ([2, 0], [2, 0])
+    assert near(found["position"] * 1e-3, 45.0)
 
 
 def test_32_nothing_listens_unless_it_is_asked_for_but_the_panel_on_loopback(tmp_path):
