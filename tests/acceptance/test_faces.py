@@ -685,7 +685,8 @@ TABLE = """
 6077 0 i16 ro *|607A 0 i32 rw 0|607D 1 i32 rw 0|607D 2 i32 rw 7A120|607F 0 u32 ro 7A120|6081 0 u32 rw 7A120
 6083 0 u32 ro 4C4B40|6084 0 u32 ro 4C4B40|6085 0 u32 ro 4C4B40|6098 0 i8 ro -1|60F4 0 i32 ro *|60FF 0 i32 rw 0
 6502 0 u32 ro 25|1400 1 u32 rw 205|1401 1 u32 rw 305|1800 1 u32 rw 185|1801 1 u32 rw 285|1801 5 u16 ro 14
-1600 1 u32 rw 60400010|1600 2 u32 rw 607A0020|1601 1 u32 rw 60600008|1A00 1 u32 rw 60410010|1A00 2 u32 rw 60640020|1A01 2 u32 rw 606C0020
+1600 1 u32 rw 60400010
+1600 2 u32 rw 607A0020|1601 1 u32 rw 60600008|1A00 1 u32 rw 60410010|1A00 2 u32 rw 60640020|1A01 2 u32 rw 606C0020
 2000 1 u32 ro *|2000 2 i32 ro *|2000 3 u8 ro 2|2000 4 u16 ro 0
 """
 """Index, part, type, access and default of each object, in hexadecimal; * where it shows how the axis is."""

@@ -52,6 +52,7 @@ class Served:
 
     def _putter(self, name: str) -> Any:
         async def put(instance: Any, value: Any) -> Any:
+            """Do it, and give the value that the field then has."""
             asked = value[0] if isinstance(value, list | tuple) and len(value) == 1 else value
             if isinstance(asked, str) and hasattr(instance, "enum_strings"):
                 asked = list(instance.enum_strings).index(asked)

@@ -72,6 +72,7 @@ def records_of(axis: AxisService, node: int) -> dict[tuple[int, str], tuple[c.En
     low, high = axis.limits or (axis.from_counts(-(1 << 31)), axis.from_counts((1 << 31) - 1))
 
     def process_data(kind: str, number: int, *mapped: int) -> dict[tuple[int, str], tuple[c.Entry, ...]]:
+        """Objects of one process data object: how it is sent, and what is in it."""
         receive = kind == "RPDO"
         base = 0x200 if receive else 0x180
         place = (0x1400 if receive else 0x1800) + number - 1

@@ -113,6 +113,7 @@ async def serve_lines(desk: Desk, address: str, dialect: Callable[[AxisService, 
     clients = 0
 
     async def attend(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """A client on TCP, if there is room for one more."""
         nonlocal clients
         if clients >= MOST_CLIENTS:
             writer.close()
