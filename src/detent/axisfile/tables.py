@@ -55,10 +55,36 @@ class HardwareTable(Table, frozen=True):
     )
 
 
+def _place(doc: str, example: str) -> Any:
+    """Declare where a face is reached."""
+    return optional(doc, "", allowed=f"text of up to 80 characters such as {example}", max_length=80)
+
+
+class FacesTable(Table, frozen=True):
+    """Protocols by which other people's software reaches the axis while it runs live; each is off without its key."""
+
+    commands: bool = optional("whether they may move the axis; without it they read, and stop", default=False)
+    epics: str = _place("EPICS motor record over Channel Access: name of the record", '"lab:m1"')
+    pva: str = _place("the same over PV Access", '"lab:m1"')
+    canopen: str = _place("CiA 402 drive: bus as python-can names it, and node", '"socketcan:can0@5"')
+    modbus: str = _place("Modbus TCP: host and port", '":1502"')
+    scpi: str = _place('lines in the style of SCPI: host and port, or "pty" for a terminal', '":5025"')
+    grbl: str = _place("grbl 1.1: the same", '"pty"')
+    gcs: str = _place("GCS 2.0 of PI: the same", '":50000"')
+    zaber: str = _place("ASCII protocol of Zaber, in native units: the same", '":55550"')
+    alpaca: str = _place("ASCOM Alpaca, a focuser or rotator: host and port", '":11111"')
+
+    @property
+    def wanted(self) -> dict[str, str]:
+        """Address of each face that has one."""
+        return {name: address for name, address in self if isinstance(address, str) and address}
+
+
 class AxisSpec(Table, frozen=True):
     """What the specification of every control method has; the models of `methods.METHODS` derive from it."""
 
     axis: AxisTable
+    faces: FacesTable | None = None
 
     def changed(self, **tables: Any) -> Self:
         """A copy with other values in its tables, ``changed(method={"scale": 1})``, or with other tables.

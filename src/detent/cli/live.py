@@ -35,6 +35,12 @@ BIND = "Address at which the panel is reached from other machines; else only thi
 PORT = "Port of the panel; else any that is free."
 NAME = "Name by which the panel is called, beside its address; repeat for more."
 PLAIN = "Serve the panel without TLS on a network; whoever is on it can then read and change what is sent."
+COMMANDS = "Let the faces move the axis; without it they read, and stop."
+EPICS = "Serve an EPICS motor record of this name over Channel Access, for ophyd and bluesky."
+PVA = "The same over PV Access."
+CANOPEN = "Be a CiA 402 drive on a CAN bus, BUS:CHANNEL@NODE as python-can names it: socketcan:can0@5."
+MODBUS = "Serve registers over Modbus TCP; loopback unless a host is named, as for all faces that follow."
+SCPI = 'Take lines in the style of SCPI, on TCP, or with "pty" on a terminal.'
 VIEWER = "Print a second link, for somebody who only looks, and may stop."
 WORD = (
     "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home; of the position "
@@ -62,11 +68,24 @@ def live(
     key_file: Annotated[str, option("--tls-key", "PEM", "Its private key.")] = "",
     plain: Annotated[bool, option("--i-accept-plain-http", "", PLAIN)] = False,
     viewer_link: Annotated[bool, option("--viewer-link", "", VIEWER)] = False,
+    epics: Annotated[str, option("--epics", "RECORD", EPICS)] = "",
+    pva: Annotated[str, option("--pva", "RECORD", PVA)] = "",
+    canopen: Annotated[str, option("--canopen", "BUS", CANOPEN)] = "",
+    modbus: Annotated[str, option("--modbus", "[HOST]:PORT", MODBUS)] = "",
+    scpi: Annotated[str, option("--scpi", "[HOST]:PORT", SCPI)] = "",
+    grbl: Annotated[str, option("--grbl", "[HOST]:PORT", "Be a grbl 1.1; the same places.")] = "",
+    gcs: Annotated[str, option("--gcs", "[HOST]:PORT", "Speak GCS 2.0 as PI's controllers do; the same.")] = "",
+    zaber: Annotated[
+        str, option("--zaber", "[HOST]:PORT", "Speak Zaber's ASCII protocol, native units; the same.")
+    ] = "",
+    alpaca: Annotated[str, option("--alpaca", "[HOST]:PORT", "Be an ASCOM Alpaca focuser or rotator.")] = "",
+    commands: Annotated[bool, option("--commands", "", COMMANDS)] = False,
     *,
     no_store: Annotated[bool, option("--no-store", "", NO_STORE)] = False,
     as_json: Json = False,
 ) -> None:
     """Run an axis live, in wall time, until Ctrl-C: it then comes to rest in a ramp and lets go."""
+    from detent.faces.child import Faces
     from detent.operate.client import LiveAxis
     from detent.operate.realtime import going_first
     from detent.operate.session import Session
@@ -76,6 +95,9 @@ def live(
 
     at = PanelPlace(bind, port, certificate, key_file, plain, names or ())
     at.check()
+    asked = {"epics": epics, "pva": pva, "canopen": canopen, "modbus": modbus, "scpi": scpi, "grbl": grbl, "gcs": gcs,
+             "zaber": zaber, "alpaca": alpaca}  # fmt: skip
+    wanted, may_command = _faces(file, overrides or [], asked, commands=commands)
     with ExitStack() as closing:
         closing.enter_context(going_first())
         place, where, (board, memory) = Place(file), None if no_store else store or beside(file), shared_memory()
@@ -95,11 +117,13 @@ def live(
         channel = _serve(closing, place, session)
         left.hear()
         panel = None if headless else closing.enter_context(contextlib.closing(Child(channel.path, at)))
+        faces = closing.enter_context(contextlib.closing(Faces(channel.path, wanted, commands=may_command)))
         links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
         more = {"channel": str(channel.path), "not_permitted": missing, "panel": links, "watchdog": watchdog.id}
+        more |= {"faces": faces.places, "commands": may_command, "face_processes": faces.processes}
         _tell_start(file, _started(session) | more, as_json=as_json)
         while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
-            _mend(panel, watchdog, quiet=as_json)
+            _mend(panel, watchdog, faces, quiet=as_json)
         status = NOT_DONE if not host.is_alive else DONE
         LiveAxis(session).close()
         host.note()  # the pulls of its end belong to the log
@@ -125,9 +149,19 @@ def _started(session: Any) -> dict[str, Any]:
     return found | {"hardware": link.driver.hardware if link else ""}
 
 
-def _mend(panel: Any, watchdog: Any, *, quiet: bool) -> None:
+def _faces(file: Path, overrides: list[str], asked: dict[str, str], *, commands: bool) -> tuple[dict[str, str], bool]:
+    """Address of each face that the file or the command line asks for, and whether they may command."""
+    from detent.methods.load import load_spec
+
+    table = load_spec(file, overrides).faces
+    stated = table.wanted if table else {}
+    return stated | {face: one for face, one in asked.items() if one}, commands or bool(table and table.commands)
+
+
+def _mend(panel: Any, watchdog: Any, faces: Any, *, quiet: bool) -> None:
     """Start again what has died beside the loop."""
     told = [panel.mend()] if panel else []
+    told += list[str](faces.mend())
     told += ["The watchdog had ended; another one watches now."] if watchdog.keep() else []
     for one in filter(None, () if quiet else told):
         tell(one)
@@ -211,11 +245,22 @@ def _tell_start(file: Path, started: dict[str, Any], *, as_json: bool) -> None:
     for link, role in zip(started["panel"], ("", ", to look only"), strict=False):
         tell(f"Panel{role}: {link} (works once, within ten minutes; another: detent connect {name} link)")
     tell(f'From a second terminal: detent connect {name} enable, then detent connect {name} move_by "5 mm"')
+    _tell_faces(started)
     for one in started["not_permitted"]:
         tell(f"Not permitted: {one}")
     _tell_store(name, started)
     tell("Ctrl-C stops the axis, then ends.")
     sys.stdout.flush()
+
+
+def _tell_faces(started: dict[str, Any]) -> None:
+    """Where other people's software finds the axis."""
+    from detent.faces.child import FACES
+
+    for face, places in started["faces"].items():
+        tell(f"{FACES[face].title}: {', '.join(places)}")
+    if started["faces"] and not started["commands"]:
+        tell("The faces read, and stop; let them move the axis with --commands")
 
 
 def _tell_store(file: str, started: dict[str, Any]) -> None:

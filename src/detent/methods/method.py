@@ -117,6 +117,7 @@ class Live:
     tick: float  # base tick [s]
     unit: str = "m"  # of positions
     speed: float = math.nan  # largest that may be commanded [m/s] or [rad/s]
+    acceleration: float = math.nan  # with which it comes to speed [m/s^2] or [rad/s^2]
     view: Mapping[str, Any] = field(default_factory=dict[str, Any])
     """What its own view on the panel shows (`panel.js` of its package): "title", and "data" that does not change."""
     feed: tuple[Any, ...] = ()  # what the host lays ready
@@ -497,6 +498,11 @@ class Method(Protocol[SpecT]):
                 "position; expected: a method with `senses`; add it to the class of the method"
             )
         return self.brought(self.senses)(spec)
+
+    def sensor(self, spec: SpecT, motor: str = "") -> "PositionSensor | None":
+        """What counts the position of one motor, or of the only one; None where the method does not say."""
+        motors = self.sensors(spec) if self.senses else {}
+        return next(iter(motors.values())) if len(motors) == 1 else motors.get(motor)
 
     def compare(self, spec: SpecT, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """The method beside its alternatives on this axis; none by default."""

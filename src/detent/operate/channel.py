@@ -23,6 +23,7 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, cast
 
+from detent.control.operation import STALE
 from detent.errors import AxisError, DetentError
 from detent.files.text import shown
 from detent.operate.audit import Audit
@@ -36,6 +37,7 @@ MOST_BEHIND = 256  # messages of a client that wait behind one that waits for a 
 MOST_WAITING = 1 << 20  # bytes that a client has not read until it is dropped
 SLOW = 1 << 16  # bytes that it has not read until it is sent no rows
 LEAVING = 0.5  # for what is still to be sent to a client that leaves [s]
+LEAVES = 20  # times that it is asked to let others command, and that the end of that is looked for
 LOOK = 2e-3  # how often endings are looked for [s]
 UNTOLD = {"keep"}  # twenty a second: of the jog that they keep there is a record
 RATES = 1.0, 50.0  # of a watch [Hz]
@@ -92,6 +94,8 @@ class Channel:
         self.session, self.path, self.audit = session, path, audit or Audit()
         self._clients: dict[int, Client] = {}
         self._come = 0  # clients that have ever come
+        self._slot, self._shown = -1, dict[str, Any]()
+        self.lost = ""  # who has left with a motion of its own under way, and when
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._serve, name="channel", daemon=True)
         self._ready, self._left = threading.Event(), asyncio.Event()
@@ -150,13 +154,32 @@ class Channel:
                     await client.turn
             self._watch_no_more(client)
             del self._clients[client.number]
-            with suppress(BlockingIOError):  # the lease of a jog runs out by itself
-                self.session.ask("leave", client=client.number)
+            self._note_lost(client)
+            await self._give_back(client)
             writer.close()
             try:  # the end of a killed client is an error, which asyncio tells where nobody asks for it
                 await asyncio.wait_for(writer.wait_closed(), LEAVING)
             except (OSError, TimeoutError, asyncio.CancelledError):
                 writer.transport.abort()
+
+    async def _give_back(self, client: Client) -> None:
+        """Let somebody else command; asked in the period of a stop it came too early, and is asked again."""
+        for _ in range(LEAVES):
+            with suppress(BlockingIOError):  # the lease of a jog runs out by itself
+                command = self.session.ask("leave", client=client.number)
+                for _ in range(LEAVES):
+                    if (ended := self.session.ending(command)) is not None and ended.code != STALE:
+                        return
+                    if ended is not None or not self.session.host.is_running:
+                        break
+                    await asyncio.sleep(LOOK)
+
+    def _note_lost(self, client: Client) -> None:
+        """Say who was lost, where what it had begun is still under way and comes to rest now."""
+        running = self.session.status()["running"]
+        if running and running["id"] in client.open and client.told:
+            self.lost = f"{client.who} has gone in a {running['command']}, which was stopped"
+            self.audit.note(client.who, client=client.number, note=self.lost)
 
     def _take(self, line: bytes, client: Client) -> None:
         """Answer a message, in its turn; a stop overtakes what waits for a disk."""
@@ -220,6 +243,8 @@ class Channel:
         except BlockingIOError as error:
             raise DetentError("too many commands at once") from error
         client.open.add(command)
+        if do not in UNTOLD and do not in LINES:
+            self.lost = ""  # somebody goes on
         if do not in UNTOLD:
             client.told.add(command)
             more = {} if value is None else {"value": value}
@@ -256,6 +281,13 @@ class Channel:
             client.watch.cancel()
             self.session.forget(client.number)
 
+    def _sample(self) -> dict[str, Any]:
+        """The axis in this fiftieth of a second: whoever watches, panel or face, sees it in the same period."""
+        slot = int(self._loop.time() * RATES[1])
+        if slot != self._slot:
+            self._slot, self._shown = slot, self.session.status()
+        return self._shown
+
     async def _stream(self, client: Client, pause: float, paths: list[str], after: int) -> None:
         """Status and rows, again and again; who reads slowly misses some."""
         missed = 0
@@ -270,11 +302,12 @@ class Channel:
             await asyncio.sleep(pause)
 
     def _status_for(self, client: Client) -> dict[str, Any]:
-        status = self.session.status()
+        status = self._sample()
         holder = self._clients.get(status["client"])
         return {
             "status": status, "why": why_not_moving(status, client.number), "clients": len(self._clients),
             "you": client.number, "holder": status["client"], "holder_name": holder.who if holder else "",
+            "lost": self.lost,
         }  # fmt: skip
 
     async def _tell_endings(self, client: Client) -> None:

@@ -144,6 +144,7 @@ class Host:
     ) -> None:  # fmt: skip
         make = operation_params(speed, careful=int(careful), creep=spec.axis.creep)
         self.method = method.name
+        self.sensor = method.sensor(spec, motor)
         self.board: Any = Board() if memory is None else Board.from_buffer(memory)
         self.link: Link | None = None
         if driver is None:

@@ -21,6 +21,7 @@ STEP = 2e-3  # how often an ending is looked for [s]
 LINES = ("stop", "disable")  # never refused
 MOST_ROWS = 2048  # of the ring, in one answer
 LARGEST = 1 << 62  # number of a row
+COUNT = 1e-6  # where a method does not say what counts the position [m]
 NOTE = 0.5  # how often what nobody asks for is taken down [s]
 
 
@@ -52,13 +53,16 @@ class Session:
         q = self.host.axis.live.operation
         limits = None if q.endless else [q.lowest, q.highest]
         period = self.host.board.loop.period * 1e-9
+        sensor = self.host.sensor
         channels = [{"name": name, "unit": unit, "help": help_} for name, (_, unit, help_) in self._signals.items()]
         facts = [] if self.host.link is None else [str(fact) for fact in self.host.link.facts]
         return self.about | {
             "unit": self.unit, "period": period, "commands": words, "limits": limits, "channels": channels,
             "injections": can_inject, "prints": self.host.axis.text is not None,
             "numbers": sorted(self.host.axis.numbers or ()), "method": self.host.method,
-            "max_speed": self.host.axis.speed,
+            "max_speed": self.host.axis.speed, "acceleration": self.host.axis.acceleration,
+            "count": sensor.scale if sensor else COUNT,
+            "origin": sensor.origin if sensor else 0.0,
             "view": dict(self.host.axis.view), "drive": facts,
         }  # fmt: skip
 

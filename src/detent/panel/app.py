@@ -22,9 +22,9 @@ from starlette.websockets import WebSocket
 
 from detent.errors import DetentError
 from detent.methods.registry import METHODS
+from detent.operate.line import Line
 from detent.panel.gate import Gate, Here, Rule, Strangers, person, place_of
 from detent.panel.keys import COOKIE, LIFETIMES, LINK, TICKET, Keys
-from detent.panel.line import Line
 from detent.panel.sockets import Budget, Sockets
 
 HERE = Path(__file__).parent

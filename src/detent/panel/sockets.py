@@ -18,9 +18,9 @@ from typing import Any, cast
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from detent.errors import DetentError
+from detent.operate.line import LONGEST, Line
 from detent.panel.gate import person
 from detent.panel.keys import TICKET, Keys, Pass
-from detent.panel.line import LONGEST, Line
 
 MOST_SOCKETS = 16
 LONGEST_FRAME = 1 << 16  # bytes, as in the channel

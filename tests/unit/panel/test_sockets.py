@@ -5,8 +5,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from detent.errors import AxisError
+from detent.operate.line import Line
 from detent.panel.keys import Keys, Pass, make_keys
-from detent.panel.line import Line
 from detent.panel.sockets import MOST_WAITING, Sockets
 
 WHO = Pass("operator", "0123456789", 0.0)

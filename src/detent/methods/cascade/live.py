@@ -202,7 +202,7 @@ def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Liv
 
     return Live(
         host.params, host.state, q, memory, host.tick, spec.unit("m"), spec.limits.speed,
-        {"title": "Cascade loop"}, host.feed, fault, legs=legs_of,
+        spec.limits.acceleration, {"title": "Cascade loop"}, host.feed, fault, legs=legs_of,
         places=places(spec, host.params, host.period), limits=guard_limits(spec),
     )  # fmt: skip
 

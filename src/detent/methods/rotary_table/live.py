@@ -164,7 +164,8 @@ def live(spec: RotaryTableSpec, operation: Callable[..., OperationParams]) -> di
     limits = {STUCK: table.stuck_effort, SATURATED: 1.0, FOLLOWING: table.following_error,
               OVERSPEED: table.overspeed * speed, JUMPED: table.jump * speed * GUARD_PERIOD}  # fmt: skip
     made = Live(
-        machine.params, machine.state, q, TableLive(), machine.tick, "rad", speed, {"title": "Dial"},
+        machine.params, machine.state, q, TableLive(), machine.tick, "rad", speed,
+        spec.limits.acceleration, {"title": "Dial"},
         fault=lambda: host.failure, legs=partial(sequence_legs, speed), numbers=frozenset(map(int, spec.position)),
         places=places(spec, strobe),
         limits=limits,

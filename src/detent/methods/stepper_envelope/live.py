@@ -316,6 +316,7 @@ def live_motor(spec: StepperEnvelopeSpec, name: str, operation: Callable[..., Op
         memory,
         tick,
         speed=table.limits.speed,
+        acceleration=table.limits.acceleration,
         view={"title": "Envelope", "data": data},
         feed=motor.feed,
         fault=fault,

@@ -3,6 +3,7 @@
 The same list serves who drives one (`canopen_drive`) and who is one (`faces.cia402`).
 """
 
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from canopen import ObjectDictionary
@@ -132,19 +133,28 @@ def _variable(entry: Entry, index: int, part: int = 0) -> ODVariable:
 
 def dictionary(node: int) -> ObjectDictionary:
     """The objects of a drive with this number."""
+    made = dictionary_of(node, OBJECTS, RECORDS)
+    words: Any = made
+    words[RX][1].default, words[TX][1].default, words[TX_2][1].default = 0x200 + node, 0x180 + node, 0x280 + node
+    return made
+
+
+def dictionary_of(
+    node: int, objects: Iterable[Entry], records: Mapping[tuple[int, str], tuple[Entry, ...]]
+) -> ObjectDictionary:
+    """A dictionary of these objects, and of objects that have parts."""
     made = ObjectDictionary()
     made.node_id = node
-    for entry in OBJECTS:
+    for entry in objects:
         made.add_object(_variable(entry, entry.place))
-    for (index, name), parts in RECORDS.items():
-        record: Any = (ODArray if index in (CONSUMER, RX_MAP, TX_MAP, TX_2_MAP) else ODRecord)(name, index)
-        access = "rw" if index in (RX_MAP, TX_MAP, TX_2_MAP) else "ro"
-        record.add_member(_variable(Entry(0, "Number of entries", UNSIGNED8, access, len(parts)), index))
+    for (index, name), parts in records.items():
+        is_map = index & ~0xFF in (0x1600, 0x1A00)
+        record: Any = (ODArray if index == CONSUMER or is_map else ODRecord)(name, index)
+        access = "rw" if is_map else "ro"
+        record.add_member(_variable(Entry(0, "Number of entries", UNSIGNED8, access, parts[-1].place), index))
         for entry in parts:
             record.add_member(_variable(entry, index, entry.place))
         made.add_object(record)
-    words: Any = made
-    words[RX][1].default, words[TX][1].default, words[TX_2][1].default = 0x200 + node, 0x180 + node, 0x280 + node
     return made
 
 

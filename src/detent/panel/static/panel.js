@@ -92,8 +92,8 @@ function showStatus() {
   say($("trust"), status.trust);
   $("trust").className = `trust ${status.trust === "referenced" ? "good" : "warn"}`;
   const who = holder ? (holder === you ? "you command" : `${link.now.holder_name || "somebody else"} commands`) : "nobody commands";
-  say($("who"), `${who}, ${clients} ${clients === 1 ? "page or program" : "pages and programs"}`);
-  mark($("who"), "warn", holder && holder !== you);
+  say($("who"), `${link.now.lost ? `${link.now.lost}; ` : ""}${who}, ${clients} ${clients === 1 ? "page or program" : "pages and programs"}`);
+  mark($("who"), "warn", (holder && holder !== you) || link.now.lost);
   say($("doing"), status.running ? status.running.command : status.rests ? "at rest" : "moving");
   const free = link.about.limits && status.trust === "unknown"; // nobody knows where they are
   say($("limits"), free ? "limits NOT active: position unknown" : status.limited && level === "good" ? "at the limit of effort" : status.confirmed ? "" : "a tenth of the speed until confirmed");

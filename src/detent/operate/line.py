@@ -1,4 +1,4 @@
-"""The panel's side of the channel to a live axis, for a program of many tasks."""
+"""A client's side of the channel to a live axis, for a program of many tasks: the panel, and every face."""
 
 import asyncio
 import json
@@ -10,6 +10,7 @@ from typing import Any, cast
 from detent.errors import AxisError, DetentError
 
 LONGEST = 4 << 20  # bytes of an answer: the axis file may have one million
+MOST_EARLY = 64  # endings that are kept for who asks after them
 PATIENCE = 5.0  # how long an answer is waited for [s]
 
 
@@ -23,7 +24,9 @@ class Line:
         self._reader, self._writer, self._marks = reader, writer, count()
         self._asked: dict[str, asyncio.Future[dict[str, Any]]] = {}
         self._tell: dict[str | int, Tell] = {}  # who wants to hear of an ending: by mark, then by the command's id
+        self._early: dict[int, dict[str, Any]] = {}  # endings of commands whose number has not come yet
         self.gone = asyncio.Event()
+        self.watched: Tell | None = None  # takes the status that comes by itself once it was asked to `watch`
         self._hearing = asyncio.ensure_future(self._hear())
 
     @classmethod
@@ -57,16 +60,30 @@ class Line:
             while text := await self._reader.readline():
                 message = cast("dict[str, Any]", json.loads(text))
                 mark = message.get("as", "")
-                if "id" in message and mark in self._tell:
-                    self._tell[message["id"]] = self._tell.pop(mark)
-                if "ended" in message and (tell := self._tell.pop(message["ended"]["id"], None)):
-                    tell(message)
+                if "id" in message and (tell := self._tell.pop(mark, None)):
+                    if (early := self._early.pop(message["id"], None)) is not None:
+                        tell(early)
+                    else:
+                        self._tell[message["id"]] = tell
+                if "ended" in message:
+                    self._end(message)
+                if "status" in message and "as" not in message and self.watched is not None:
+                    self.watched(message)
                 waiting = self._asked.get(mark)
                 if waiting is not None and not waiting.done():
                     waiting.set_result(message)
         except (OSError, ValueError):
             pass
         self.gone.set()
+
+    def _end(self, message: dict[str, Any]) -> None:
+        """An ending; one that a disk was asked for may come before the number of its command does."""
+        if tell := self._tell.pop(message["ended"]["id"], None):
+            tell(message)
+            return
+        self._early[message["ended"]["id"]] = message
+        while len(self._early) > MOST_EARLY:
+            del self._early[next(iter(self._early))]
 
     def close(self) -> None:
         """Leave."""

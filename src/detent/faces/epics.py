@@ -1,0 +1,129 @@
+"""The motor record over Channel Access, by caproto: all of its fields, of which those of `motor` live."""
+
+import asyncio
+import logging
+import os
+from collections.abc import Mapping
+from typing import Any
+
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# caproto has no types for its properties.
+from caproto import AlarmSeverity, AlarmStatus
+from caproto.asyncio.server import Context
+from caproto.server import PVGroup, pvproperty
+
+from detent.errors import DetentError
+from detent.faces.motor import Motor, name_of
+from detent.faces.service import Desk
+
+PORT = 5064
+SHOWN = 0.02  # until what has changed is at its clients: a put is complete behind that [s]
+
+
+class Record(PVGroup):
+    """A motor record and, behind its name and a colon, what else is known of the axis."""
+
+    motor = pvproperty(value=0.0, name="", record="motor", precision=4)
+    trust = pvproperty(value="", name=":trust", max_length=16, read_only=True)
+    state = pvproperty(value="", name=":state", max_length=40, read_only=True)
+    fault = pvproperty(value=0, name=":fault", read_only=True)
+    fault_text = pvproperty(value="", name=":fault_text", max_length=240, read_only=True)
+    sample = pvproperty(value="", name=":sample", max_length=240, read_only=True)
+    effort = pvproperty(value=0.0, name=":effort", read_only=True)
+
+
+class Served:
+    """A record that is served."""
+
+    def __init__(self, name: str) -> None:
+        self.group = Record(prefix=name)
+        self.value: Any = self.group.motor
+        self.fields: dict[str, Any] = dict(self.value.fields)
+        self.motor: Motor
+        self._refused: list[Any] = []  # puts were, which caproto makes an alarm of theirs
+
+    def attach(self, motor: Motor) -> None:
+        """Puts go to the record."""
+        self.motor = motor
+        self.value.putter = self._putter("VAL")
+        for name in motor.actions:
+            if name != "VAL" and name in self.fields:
+                self.fields[name].putter = self._putter(name)
+
+    def _putter(self, name: str) -> Any:
+        async def put(instance: Any, value: Any) -> Any:
+            """Do it, and give the value that the field then has."""
+            asked = value[0] if isinstance(value, list | tuple) and len(value) == 1 else value
+            if isinstance(asked, str) and hasattr(instance, "enum_strings"):
+                asked = list(instance.enum_strings).index(asked)
+            if isinstance(asked, bytes | str):  # a name of a unit: it stays what it is
+                asked = self.motor.fields[name]
+            try:
+                await self.motor.put(name, asked)
+            except DetentError:
+                self._refused.append(instance)
+                raise
+            await asyncio.sleep(SHOWN)
+            return self.motor.fields.get(name, asked)
+
+        return put
+
+    async def show(self, fields: Mapping[str, Any]) -> None:
+        """Tell clients what has changed."""
+        if fields.keys() & {"HLM", "LLM"}:
+            ends = {"upper_ctrl_limit": self.motor.fields["HLM"], "lower_ctrl_limit": self.motor.fields["LLM"]}
+            await self.value.write_metadata(**ends)
+        for name, value in fields.items():
+            if name == "VAL":
+                await self.value.write(value, verify_value=False)
+            elif name in self.fields:
+                await self.fields[name].write(value, verify_value=False)
+
+    async def begin(self, motor: Motor) -> None:
+        """What does not change, and all that there is now."""
+        await self.value.write_metadata(units=motor.axis.unit, precision=motor.fields["PREC"])
+        for field in self.fields.values():
+            if hasattr(field, "precision"):
+                await field.write_metadata(precision=motor.fields["PREC"])
+            if hasattr(field, "units") and field.name.split(".")[-1] not in ("ACCL", "BACC", "DLY"):
+                await field.write_metadata(units=motor.axis.unit)
+        await self.show(motor.fields)
+
+    async def follow(self, motor: Motor) -> None:
+        """Show what is no field, as far as it has changed."""
+        shown: dict[str, Any] = {}
+        while not motor.axis.gone.is_set():
+            for name, value in motor.extras().items():
+                if shown.get(name) != value:
+                    await getattr(self.group, name).write(value, verify_value=False)
+                    shown[name] = value
+            while self._refused:
+                await self._refused.pop().alarm.write(severity=AlarmSeverity.NO_ALARM, status=AlarmStatus.NO_ALARM)
+            if self.value.alarm.severity != motor.severity:
+                await self.value.alarm.write(severity=AlarmSeverity(motor.severity), status=AlarmStatus(motor.status))
+            await asyncio.sleep(SHOWN)
+
+
+async def serve(desk: Desk, address: str) -> list[str]:
+    """Serve; gives what a client needs."""
+    for logger in ("caproto", "caproto.circ", "caproto.ctx", "caproto.bcast", "caproto.ch"):
+        logging.getLogger(logger).setLevel(logging.CRITICAL + 1)
+    name, host, port = name_of("epics", address, PORT)
+    # Beacons go where clients are told to listen, not to all networks.
+    os.environ |= {
+        "EPICS_CA_SERVER_PORT": str(port), "EPICS_CAS_SERVER_PORT": str(port), "EPICS_CAS_INTF_ADDR_LIST": host,
+        "EPICS_CAS_AUTO_BEACON_ADDR_LIST": "NO", "EPICS_CAS_BEACON_ADDR_LIST": host,
+    }  # fmt: skip
+    axis = await desk.open()
+    served = Served(name)
+    motor = Motor(axis, served.show)
+    served.attach(motor)
+    await served.begin(motor)
+    context = Context(served.group.pvdb, [host])
+    for work in (context.run(), motor.follow(), served.follow(motor)):
+        desk.keep(asyncio.ensure_future(work))
+    while not context.port:  # noqa: ASYNC110 - caproto tells it nobody
+        await asyncio.sleep(0.01)
+    return [
+        name, f"EPICS_CA_ADDR_LIST={host} EPICS_CA_AUTO_ADDR_LIST=NO EPICS_CA_SERVER_PORT={port}",
+    ]  # fmt: skip

@@ -1,0 +1,263 @@
+"""GCS 2.0 as PI's controllers speak it: the part of it that moves one axis, called "1"."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from importlib.metadata import version
+from typing import Any
+
+from detent.errors import DetentError
+from detent.faces.service import BEYOND, READ_ONLY, UNREFERENCED, AxisService, Desk, NotDoneError
+from detent.faces.talk import Send, Talk, serve_lines
+
+PORT = 50000
+AXIS = "1"
+SYNTAX, UNKNOWN, UNMOVABLE, OUTSIDE, TOO_FAST, STOPPED, NO_AXIS, RANGE, PROTECTED = 1, 2, 5, 7, 8, 10, 15, 17, 63
+"""Numbers of errors, as PI's manuals have them."""
+MOTION, READY, STATUS, HALT = 5, 7, 4, 24  # characters that stand for themselves
+IN_ERRORS = {BEYOND: OUTSIDE, UNREFERENCED: UNMOVABLE, 101: UNMOVABLE, 102: UNMOVABLE, READ_ONLY: PROTECTED}
+
+
+class GcsError(Exception):
+    """A line that is not done."""
+
+    def __init__(self, code: int) -> None:
+        self.code = code
+        super().__init__(code)
+
+
+class Gcs(Talk):
+    """One client."""
+
+    def __init__(self, axis: AxisService, send: Send) -> None:
+        super().__init__(axis, send)
+        self.number, self.speed = 0, axis.speed
+        self._begun: asyncio.Future[None] | None = None
+
+    def stops(self, line: str) -> bool:
+        """STP and HLT overtake."""
+        return line.partition(" ")[0].upper() in ("STP", "HLT")
+
+    def urgent(self, byte: int) -> bool:
+        """Single characters: is it moving, is it ready, its status, stop."""
+        if byte == MOTION:
+            self.send(format(int(self._moves()), "x"))
+        elif byte == READY:
+            self._send(b"\xb1\n")
+        elif byte == STATUS:
+            self.send(f"0x{self.status_word():x}")
+        elif byte == HALT:
+            task = asyncio.ensure_future(self.answer("STP"))
+            self._stopping = task
+        else:
+            return False
+        return True
+
+    def _moves(self) -> bool:
+        return self.axis.moving or (self._begun is not None and not self._begun.done())
+
+    def status_word(self) -> int:
+        """As the table of SRG? and #4 has it: limits, reference, error, servo, moving, on target."""
+        axis = self.axis
+        bits = {
+            0x0001: axis.at_end == "lower", 0x0004: axis.at_end == "upper", 0x0100: axis.fault != 0,
+            0x1000: axis.enabled, 0x2000: self._moves(), 0x8000: bool(axis.status["in_window"]),
+        }  # fmt: skip
+        return sum(bit for bit, is_set in bits.items() if is_set)
+
+    async def answer(self, line: str) -> None:
+        """One command."""
+        word, *values = line.split()
+        try:
+            handler = HANDLERS.get(word.upper())
+            if handler is None:
+                raise GcsError(UNKNOWN)  # noqa: TRY301 - one place that keeps the number
+            await self.axis.refresh()
+            told = await handler(self, values)
+        except GcsError as error:
+            self.number = error.code
+        except NotDoneError as error:
+            self.number = IN_ERRORS.get(error.code, error.code if error.code > 1000 else UNMOVABLE)
+        except (DetentError, ValueError):
+            self.number = SYNTAX
+        else:
+            if told is not None:
+                lines = told.split("\n")
+                self.send(" \n".join(lines))
+
+    # ---- what handlers share
+
+    def pairs(self, values: list[str]) -> float:
+        """The value that is given for the axis."""
+        if len(values) != 2:
+            raise GcsError(SYNTAX)
+        self.only(values[:1])
+        return float(values[1])
+
+    def only(self, values: list[str]) -> None:
+        """The axis, or nothing, which means all of them."""
+        if any(value != AXIS for value in values):
+            raise GcsError(NO_AXIS)
+
+    def shown(self, values: list[str], value: object) -> str:
+        """What is answered of the axis."""
+        self.only(values)
+        return f"{AXIS}={value:.7f}" if isinstance(value, float) else f"{AXIS}={value}"
+
+    async def begin(self, word: str, value: float | None = None) -> None:
+        """Begin a motion: GCS waits for none."""
+        if not self.axis.enabled:
+            raise GcsError(UNMOVABLE)
+        ending = await self.axis.start(word, value, self.axis.share(self.speed))
+        self._begun = asyncio.ensure_future(self._end(word, ending))
+
+    async def _end(self, word: str, ending: "asyncio.Future[dict[str, Any]]") -> None:
+        try:
+            await self.axis.ended(word, ending)
+        except NotDoneError as error:
+            if error.how != "aborted":
+                self.number = IN_ERRORS.get(error.code, UNMOVABLE)
+
+
+Handler = Callable[[Gcs, list[str]], Awaitable[str | None]]
+HANDLERS: dict[str, Handler] = {}
+HELP: dict[str, str] = {}
+
+
+def command(word: str, about: str) -> Callable[[Handler], Handler]:
+    """Declare a command."""
+
+    def declare(handler: Handler) -> Handler:
+        HANDLERS[word], HELP[word] = handler, about
+        return handler
+
+    return declare
+
+
+def shows(word: str, about: str, value: Callable[[AxisService], object]) -> None:
+    """Declare a question about the axis."""
+
+    async def show(talk: Gcs, values: list[str]) -> str:
+        return talk.shown(values, value(talk.axis))
+
+    command(word, about)(show)
+
+
+def _limits(axis: AxisService) -> tuple[float, float]:
+    return axis.limits or (-1e9, 1e9)
+
+
+shows("POS?", "get real position", lambda axis: axis.position)
+shows("MOV?", "get target position", lambda axis: axis.target)
+shows("ONT?", "get on-target state", lambda axis: int(not axis.moving and bool(axis.status["in_window"])))
+shows("SVO?", "get servo mode", lambda axis: int(axis.enabled))
+shows("FRF?", "get referencing result", lambda axis: int(axis.homed))
+shows("TMN?", "get minimum commandable position", lambda axis: _limits(axis)[0])
+shows("TMX?", "get maximum commandable position", lambda axis: _limits(axis)[1])
+shows("CST?", "get stage type", lambda axis: axis.about["name"].replace(" ", "_"))
+shows("PUN?", "get position unit", lambda axis: axis.unit)
+shows("TRS?", "indicate reference switch", lambda axis: int("home" in axis.about["commands"]))
+shows("LIM?", "indicate limit switches", lambda _axis: 0)
+shows("RON?", "get reference mode", lambda _axis: 1)
+shows("TCV?", "get commanded velocity", lambda axis: axis.velocity)
+shows("OVF?", "get overflow state", lambda axis: int(axis.status["limited"]))
+
+
+@command("*IDN?", "get device identification")
+async def _(talk: Gcs, _values: list[str]) -> str:
+    name = talk.axis.about["name"].replace(",", " ")
+    return f"(c)detent, GCS 2.0 face of {name}, 0, {version('detent')}"
+
+
+@command("VER?", "get versions")
+async def _(_talk: Gcs, _values: list[str]) -> str:
+    return f"detent: {version('detent')}"
+
+
+@command("CSV?", "get current syntax version")
+async def _(_talk: Gcs, _values: list[str]) -> str:
+    return "2.0"
+
+
+@command("SAI?", "get list of current axis identifiers")
+async def _(_talk: Gcs, _values: list[str]) -> str:
+    return AXIS
+
+
+@command("HLP?", "get list of available commands")
+async def _(_talk: Gcs, _values: list[str]) -> str:
+    return "\n".join(
+        ["The following commands are valid:", *(f"{word} {told}" for word, told in HELP.items()), "end of help"]
+    )
+
+
+@command("ERR?", "get error number")
+async def _(talk: Gcs, _values: list[str]) -> str:
+    error, talk.number = talk.number, 0
+    return str(error)
+
+
+@command("SVO", "set servo mode")
+async def _(talk: Gcs, values: list[str]) -> None:
+    await (talk.axis.enable() if talk.pairs(values) else talk.axis.do("disable"))
+
+
+@command("MOV", "set target position")
+async def _(talk: Gcs, values: list[str]) -> None:
+    target = talk.pairs(values)
+    low, high = _limits(talk.axis)
+    if not low <= target <= high:
+        raise GcsError(OUTSIDE)
+    talk.axis.target = target
+    await talk.begin("move_to", talk.axis.in_si(target))
+
+
+@command("MVR", "set target relative to current position")
+async def _(talk: Gcs, values: list[str]) -> None:
+    target = talk.axis.target + talk.pairs(values)
+    await HANDLERS["MOV"](talk, [AXIS, repr(target)])
+
+
+@command("VEL", "set closed-loop velocity")
+async def _(talk: Gcs, values: list[str]) -> None:
+    speed = talk.pairs(values)
+    if not 0.0 < speed <= talk.axis.speed * (1 + 1e-9):
+        raise GcsError(TOO_FAST)
+    talk.speed = speed
+
+
+@command("VEL?", "get closed-loop velocity")
+async def _(talk: Gcs, values: list[str]) -> str:
+    return talk.shown(values, talk.speed)
+
+
+@command("FRF", "start reference move to reference switch")
+async def _(talk: Gcs, values: list[str]) -> None:
+    talk.only(values)
+    if "home" in talk.axis.about["commands"]:
+        await talk.begin("home")
+    else:  # an axis that cannot look for its reference has a person's word for it
+        await talk.axis.do("trust", 2)
+    talk.axis.target = talk.axis.position
+
+
+@command("STP", "stop all axes abruptly")
+async def _(talk: Gcs, _values: list[str]) -> None:
+    talk.number = STOPPED  # at once: who asks for it does not wait for rest
+    await talk.axis.stop()
+    talk.axis.target = talk.axis.commanded
+
+
+@command("HLT", "halt motion smoothly")
+async def _(talk: Gcs, values: list[str]) -> None:
+    talk.only(values)
+    await HANDLERS["STP"](talk, [])
+
+
+@command("SAMPLE?", "number of a period, and in it state, position, trust and fault, as all faces show them")
+async def _(talk: Gcs, _values: list[str]) -> str:
+    return str(talk.axis.sample)
+
+
+async def serve(desk: Desk, address: str) -> list[str]:
+    """Serve; gives what a client needs."""
+    return await serve_lines(desk, address, Gcs, PORT)

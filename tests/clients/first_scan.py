@@ -1,0 +1,19 @@
+"""A first scan of a simulated stage: 21 points, and how far the read-back was from the set-point."""
+
+import json
+import sys
+
+from bluesky import RunEngine
+from bluesky.plans import scan
+from ophyd import EpicsMotor
+
+motor = EpicsMotor(sys.argv[1], name="motor")
+motor.wait_for_connection(timeout=10)
+
+events = []
+engine = RunEngine()
+engine.subscribe(lambda kind, document: events.append(document["data"]) if kind == "event" else None)
+engine(scan([motor], motor, 30, 50, 21))
+
+worst = max(abs(one["motor"] - one["motor_user_setpoint"]) for one in events)
+print(json.dumps({"points": len(events), "worst": worst, "unit": motor.egu}))
