@@ -36,7 +36,7 @@ def program() -> Path:
     """The board of the example, compiled without a warning."""
     folder = Path(mkdtemp()) / "firmware"
     made = export_firmware(load(FILE), folder, prefix="slide", ticks=10)
-    sources = ["slide.c", "slide_params.c", "slide_selftest.c", "slide_image.c", "slide_serial.c", "posix.c"]
+    sources = ["slide.c", "slide_params.c", "slide_selftest.c", "slide_serial.c", "posix.c"]
     assert made.name == "slide"
     told = [*f"{CC} {FLAGS} {WARNINGS} -Werror -O2".split(), *sources, "-lm", "-o", "board"]
     subprocess.run(told, cwd=folder, check=True)

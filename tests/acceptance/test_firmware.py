@@ -102,11 +102,11 @@ def unit_sources(place: Path, name: str) -> list[str]:
 
 
 def sources_and_test(place: Path, name: str) -> list[str]:
-    return [*unit_sources(place, name), f"{name}_image.c", f"{name}_selftest.c"]
+    return [*unit_sources(place, name), f"{name}_selftest.c"]
 
 
 def sources(place: Path, name: str) -> list[str]:
-    return [*sources_and_test(place, name), f"{name}_replay.c", "board.c"]
+    return [*sources_and_test(place, name), f"{name}_image.c", f"{name}_replay.c", "board.c"]
 
 
 def run(command: str, place: Path, *words: str) -> subprocess.CompletedProcess[str]:
@@ -1209,7 +1209,7 @@ def test_30_a_program_of_60_lines_drives_the_cascade_to_the_bit_of_the_simulatio
         (tmp_path / name).write_text(text)
     made = run(
         f"gcc {FLAGS} {WARNINGS} -Wno-missing-prototypes -Werror -O2 -Ifirmware axis.c host.c firmware/slide.c "
-        "firmware/slide_params.c firmware/slide_selftest.c firmware/slide_image.c -lm -o host", tmp_path,
+        "firmware/slide_params.c firmware/slide_selftest.c -lm -o host", tmp_path,
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     told = run("./host", tmp_path)

@@ -6,7 +6,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from typing import Any
 
@@ -281,7 +281,7 @@ def texts(  # noqa: PLR0913 - what the files tell of
     made["params.csv"] = table(parameters(program, params))
     made["registers.csv"] = table(registers(unit))
     made["trace.csv"] = table(traced(program, made[f"{name}.c"]))
-    parts = ("", "_params", "_tables", "_image", "_selftest")
+    parts = ("", "_params", "_tables", "_selftest")
     sources = [f"{name}{part}.c" for part in parts if f"{name}{part}.c" in made]
     flags = f"{FLAGS} {PROCESSORS[target]}".strip()
     made["build.mk"] = f"{name}_CFLAGS := {flags}\n{name}_SOURCES := {' '.join(sources)}\n"
@@ -301,9 +301,13 @@ def _selftest_text(unit: ControlUnit, params: Registers, given: Mapping[str, Any
                  for code in codes]  # fmt: skip
         shown = [(place_of(leaf.path, "c->", "l->"), number(value).text) for leaf, value in one.shown]
         calls.append({"name": one.name, "texts": texts, "shown": shown})
+    small = [(leaf.path[0], in_c(unit, leaf, "", "")) for leaf in unit.leaves if leaf.length <= LARGE]
+    places = {root: [replace(one, place=one.place.removesuffix("[k]")) for of, one in small if of == root]
+              for root in "cl"}  # fmt: skip
     sizes = {root: sum(leaf.width.size * max(leaf.length, 1) for leaf in unit.leaves if leaf.path[0] == root)
              for root in "cl"}  # fmt: skip
-    return template("selftest.c.in", **given, laid=found.laid, calls=calls, hash=f"{found.hash:016X}", sizes=sizes)
+    given = dict(given) | {"laid": found.laid, "calls": calls, "sizes": sizes, "places": places}
+    return template("selftest.c.in", **given, hash=f"{found.hash:016X}")
 
 
 def _arguments(taken: Iterable[str | Width]) -> Iterator[str]:

@@ -187,6 +187,7 @@ def _replayed(folder: Path, manifest: dict[str, str], target: Target, level: str
         job_file, ticks, wanted = job_for(folder, manifest, target, work)
         strict = f"{target.compiler} {FLAGS} {level} {target.flags} {target.warnings} -Werror -I{source} -c"
         told = run_tool([*strict.split(), str(source / f"{name}.c"), "-o", "unit.o"], work)
+        told = told or run_tool([*strict.split(), str(source / f"{name}_selftest.c"), "-o", "selftest.o"], work)
         told = told or compile_parts(source, name, target, level, work, job=job_file)
         # The program of the random vectors holds the unit's own text, and sees its inner functions.
         programs = {"job": ("unit", "replay", "selftest")} | ({"drawn": ("drawn",)} if target.share else {})

@@ -265,6 +265,6 @@ Written by detent {manifest["detent"]} from an axis of the method {manifest["met
 The simulation handles what happened in a tick at its end: equal bits need the same calls in the same order.
 
 `detent verify` on this folder replays `vectors/job.vec`: {manifest["ticks"]} ticks of {manifest["job"]}, and compares
-the hash of all registers after every one. On a board, compile `{name}_replay.c` too, give it `{name}_get` and
-`{name}_put`, and call `{name}_replay()`: 0 is equal.
+the hash of all registers after every one. On a board, compile `{name}_image.c` and `{name}_replay.c` too, give them
+`{name}_get` and `{name}_put`, and call `{name}_replay()`: 0 is equal.
 """
