@@ -290,7 +290,7 @@ def exported_unit(folder: Path, manifest: Mapping[str, Any]) -> tuple[ControlUni
     """The unit of an export, and its parameters at power-on; None where its registers are others by now."""
     unit = unit_named(manifest["method"], manifest["name"])
     data = (folder / "vectors/params.bin").read_bytes()
-    if unit is None or len(data) != ctypes.sizeof(unit.params):
+    if unit is None or "fit" not in manifest or len(data) != ctypes.sizeof(unit.params):
         return None
     return unit.fitted_as(manifest["fit"]), unit.params.from_buffer_copy(data)
 
