@@ -111,9 +111,9 @@ def _share_at_ends(run: Run, runs: Sequence[Run]) -> float:
     """Share of the samples whose effort is at its largest or smallest value, and was not put there by a step."""
     efforts = [one.effort for one in runs] or [run.effort]
     top, bottom = max(float(effort.max()) for effort in efforts), min(float(effort.min()) for effort in efforts)
-    ends = [run.effort == end for end in {top, bottom}]
-    cut = [end & ~stepped(run.effort, end, top - bottom, is_part=len(efforts) > 1) for end in ends]
-    return float(np.mean(np.logical_or.reduce(cut)))
+    above, below = run.effort == top, run.effort == bottom
+    cut = [end & ~stepped(run.effort, end, top - bottom, is_part=len(efforts) > 1) for end in (above, below)]
+    return float(np.count_nonzero(cut[0] | cut[1])) / len(run.effort)
 
 
 def _share_left_behind(run: Run) -> float:
