@@ -207,6 +207,13 @@ def by_velocity(m: Motion) -> str:
     return "time [s],velocity [mm/s],current [A]\n" + rows(m.t, m.velocity * 1e3, m.current)
 
 
+def signals(path: Path, recorded: Motion) -> None:
+    """A list of signals, each with its name, its unit and its numbers."""
+    told = (("time", "s", recorded.t), ("position", "mm", recorded.position * 1e3), ("current", "A", recorded.current))
+    held = [{"name": name, "unit": unit, "values": values.tolist()} for name, unit, values in told]
+    path.write_text(json.dumps({"device": "drive 7", "signals": held}), encoding="utf-8")
+
+
 def by_line(path: Path, m: Motion) -> None:
     """One record per line, with a structure in it."""
     samples = zip(m.t.tolist(), (m.position * 1e3).tolist(), m.current.tolist(), strict=True)
@@ -246,6 +253,7 @@ KINDS = (
     Kind("codesys", ".csv", _text(codesys), ("position=PLC_PRG.axis.fActPosition [mm]",)),
     Kind("sysid", ".json", sysid),
     Kind("nested", ".json", nested),
+    Kind("signals", ".json", signals),
     Kind("archiver", ".csv", _text(archiver)),
     Kind("quoted_rows", ".csv", _text(quoted)),
     *(Kind(name, ".csv", write) for name, write in TABLES.items()),

@@ -27,7 +27,7 @@ EFFORT = (
 )
 METHOD = (
     "regression: fits the equations of motion, takes a second; output-error: also fits the simulation to the "
-    "recording; auto: does so where the regression alone does not predict the motion."
+    "recording; auto: regression, and says whether output-error would predict the motion better."
 )
 AXIS = (
     "Cascade axis file: its constants outside the confidence intervals are reported, --write updates it with the "

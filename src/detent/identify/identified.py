@@ -286,8 +286,8 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     effort : str, optional
         What drives the axis: force, torque, current, voltage or command; by default the first of these in the logs.
     method : str
-        "regression"; "output error", which fits the simulation to the recordings too; "auto", which does so where the
-        regression alone does not predict the motion, and takes what predicts better.
+        "regression"; "output error", which fits the simulation to the recordings too; "auto": regression, which tries
+        the simulation fit where it alone does not predict the motion, and says which is better.
     axis : path, optional
         Cascade axis file that the constants are compared with, and put into by `Identified.save`.
     progress : callable, optional

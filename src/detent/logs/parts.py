@@ -53,8 +53,8 @@ def _candidates(table: RawTable, used: Sequence[str]) -> Mapping[str, list[Chang
     """Columns that may tell tests apart: of words, and of numbers that nothing else takes."""
     found = dict(table.words)
     for name, values in table.columns.items():
-        cuts = np.r_[0, np.flatnonzero(np.diff(values) != 0) + 1] if name not in used and len(values) else []
-        if 1 < len(cuts) <= MOST_TESTS:
+        cuts: list[int] = [0, *(np.flatnonzero(np.diff(values) != 0)[: MOST_TESTS + 1] + 1).tolist()]
+        if name not in used and 1 < len(cuts) <= MOST_TESTS:
             found[name] = [(int(table.rows[cut]), f"{values[cut]:g}") for cut in cuts]
     return found
 

@@ -46,6 +46,8 @@ def read_json(path: Path, options: FileOptions) -> RawTable:
         got = "brackets nested too deeply" if isinstance(error, RecursionError) else "a number of thousands of digits"
         raise InputError.of_file(file, got, ALLOWED, "name another file") from None
     if isinstance(found, list):
+        if signals := _signals(cast("list[Any]", found)):
+            return table_of(file, signals, ALLOWED)
         return _from_records(file, cast("list[Any]", found), {})
     return _from_object(file, found, options.table)
 
@@ -53,6 +55,10 @@ def read_json(path: Path, options: FileOptions) -> RawTable:
 def _from_object(file: str, found: Any, name: str) -> RawTable:
     """Read an object: the records it holds under some name, or lists by their names."""
     items: Record = {item.name: item.value for item in flatten("", found) if item.name}
+    for key in [key for key, value in items.items() if _is_records(value) and key != name]:
+        if signals := _signals(items[key]):
+            others = [Item(other, _array(value)) for other, value in items.items() if other != key]
+            return table_of(file, [*signals, *others], ALLOWED)
     lists = [key for key, value in items.items() if _is_records(value)]
     if items.get("sysid") is True and not name:
         return _characterisation(file, items, lists)
@@ -91,6 +97,20 @@ def _characterisation(file: str, items: Record, lists: list[str]) -> RawTable:
 def _is_records(value: Any) -> bool:
     """True for a list of records."""
     return isinstance(value, list) and bool(value) and isinstance(value[0], dict | list)  # pyright: ignore[reportUnknownArgumentType]
+
+
+def _signals(records: list[Any]) -> list[Item]:
+    """Signals of a list in which each has its name, its numbers in one list, and perhaps its unit; else nothing."""
+    found: list[Item] = []
+    for record in records:
+        stated = cast("Record", record) if isinstance(record, dict) else {}
+        series: list[Any] = [value for value in stated.values() if isinstance(value, list)]
+        named = next((stated[key] for key in ("name", "Name", "label", "signal") if key in stated), None)
+        if len(series) != 1 or not isinstance(named, str):
+            return []
+        unit = next((stated[key] for key in ("unit", "Unit", "units") if isinstance(stated.get(key), str)), "")
+        found.append(Item(named, _array(series[0]), str(unit)))
+    return found
 
 
 def _array(value: Any) -> Any:

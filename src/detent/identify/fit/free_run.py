@@ -174,8 +174,8 @@ def free_spread(constants: Constants, runs: Sequence[Run]) -> float:
         nudges = np.array([_nudge(constants, k, run.step) for k in range(len(errors))])
         changes *= np.where(errors > 0.0, errors / nudges, 0.0)[:, None]
         # In one order on every processor.
-        found.append(sum((row * (constants.correlation[k][:, None] * changes).sum(axis=0))
-                         for k, row in enumerate(changes)))  # fmt: skip
+        rows = [row * (r[:, None] * changes).sum(axis=0) for r, row in zip(constants.correlation, changes, strict=True)]
+        found.append(np.array(rows).sum(axis=0))
     spread = quantile(float(constants.degrees.min())) * math.sqrt(max(float(np.mean(np.concatenate(found))), 0.0))
     return spread if spread < FARTHEST * way else math.nan
 

@@ -34,7 +34,7 @@ LASTING = 0.9  # correlation of neighbouring residuals from which the model miss
 WORST_LASTING = 0.05  # error of the prediction from which that matters
 WORST_MISSED, WORST_FREE = 0.4, 0.8  # error of simulations over the travel: of half a second and more; of the free run
 FAR_OFF = "simulation is far off"
-WELL_MET = 0.2  # the same up to which constants of the simulation fit are taken where the regression's are far off
+WELL_MET = 0.2  # the same up to which the simulation fit is recommended where the regression is far off
 BETTER_MISSED = 0.7  # such an error in that of another way to the constants, up to which it is the better one
 WORST_PREDICTION = 0.35  # error of the prediction of held-out segments over the effort, at most
 WORST_SIMULATION = 0.7  # simulated error over that of going on with the velocity of the start, at most
@@ -111,9 +111,9 @@ def _share_at_ends(run: Run, runs: Sequence[Run]) -> float:
     """Share of the samples whose effort is at its largest or smallest value, and was not put there by a step."""
     efforts = [one.effort for one in runs] or [run.effort]
     top, bottom = max(float(effort.max()) for effort in efforts), min(float(effort.min()) for effort in efforts)
-    ends = [run.effort == end for end in {top, bottom}]
-    cut = [end & ~stepped(run.effort, end, top - bottom, is_part=len(efforts) > 1) for end in ends]
-    return float(np.mean(np.logical_or.reduce(cut)))
+    above, below = run.effort == top, run.effort == bottom
+    cut = [end & ~stepped(run.effort, end, top - bottom, is_part=len(efforts) > 1) for end in (above, below)]
+    return float(np.count_nonzero(cut[0] | cut[1])) / len(run.effort)
 
 
 def _share_left_behind(run: Run) -> float:
