@@ -10,6 +10,7 @@ import signal
 import socket
 import struct
 import subprocess
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -816,6 +817,91 @@ def test_29_a_second_commander_is_refused_by_each_protocol_and_may_stop(axis):
         assert (found["move"], found["stop"]) == ([4, 43], [2, 0])
         with pytest.raises(Exception, match="stop ended it"):
             moving.wait()
+
+
+Shown = dict[int, tuple[str, int, str, int]]  # by the number of the period: state, count, trust, fault
+
+
+def by_line(port: str, question: bytes, left: threading.Event, found: Shown) -> None:
+    """A client that polls a line protocol fifty times a second."""
+    with socket.create_connection(("127.0.0.1", int(port))) as line:
+        answers = line.makefile("rb")
+        while not left.wait(0.02):
+            line.sendall(question)
+            text = answers.readline().decode().strip().rpartition("-- ")[2].replace("_", " ")
+            number, state, position, trust, fault = text.split(",")
+            found[int(number)] = (state, round(float(position) * 1e3), trust, int(fault))
+
+
+def by_registers(port: str, left: threading.Event, found: Shown) -> None:
+    """The same over Modbus."""
+    from pymodbus.client import ModbusTcpClient
+
+    from detent.faces.modbus import STATES, TRUSTS, signed
+
+    client = ModbusTcpClient("127.0.0.1", port=int(port))
+    client.connect()
+    while not left.wait(0.02):
+        r = client.read_holding_registers(10, count=8).registers
+        found[r[0] << 16 | r[1]] = (STATES[r[3]], signed(r[6:8]), TRUSTS[r[4]], r[5])
+    client.close()
+
+
+def by_page(axis: Faced, left: threading.Event, found: Shown) -> None:
+    """What a panel is sent."""
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect(axis.started["channel"])
+        line.sendall(b'{"do": "watch", "rate": 50}\n')
+        for text in line.makefile():
+            s = json.loads(text).get("status")
+            if s:
+                fault = s["fault"]["code"] if s["fault"] else 0
+                found[s["loop"]["periods"]] = (s["state"], round(s["position"] * 1e6), s["trust"], fault)
+            if left.is_set():
+                return
+
+
+def missed(own: Any, seconds: float) -> float:
+    """Share of the periods that the loop skips meanwhile."""
+    before = own.status["loop"]
+    time.sleep(seconds)
+    after = own.status["loop"]
+    return (after["skipped"] - before["skipped"]) / (after["periods"] - before["periods"])
+
+
+def test_28_four_faces_and_a_panel_show_the_same_sample(axis, plain):
+    with connected(plain) as own:
+        without = missed(own, 5.0)
+    left, shown = threading.Event(), [Shown() for _ in range(5)]
+    clients = [
+        threading.Thread(target=by_line, args=(axis.port("scpi"), b"SAMP?\n", left, shown[0])),
+        threading.Thread(target=by_line, args=(axis.port("gcs"), b"SAMPLE?\n", left, shown[1])),
+        threading.Thread(target=by_line, args=(axis.port("zaber"), b"/1 detent\r\n", left, shown[2])),
+        threading.Thread(target=by_registers, args=(axis.port("modbus"), left, shown[3])),
+        threading.Thread(target=by_page, args=(axis, left, shown[4])),
+    ]
+    for one in clients:
+        one.start()
+    try:
+        with connected(axis) as own:
+            own.enable()
+            own.confirm()
+            moving = own.move_to("300 mm", speed=0.05, wait=False)
+            late = missed(own, 12.0)
+            own.stop()
+            assert moving.done
+    finally:
+        left.set()
+        for one in clients:
+            one.join()
+    compared = 0
+    for face in shown[:4]:
+        both = face.keys() & shown[4].keys()
+        compared += len(both)
+        assert all(face[number] == shown[4][number] for number in both)
+    assert compared >= 1000
+    assert len({count for _, count, _, _ in shown[4].values()}) > 100  # it did move
+    assert late <= 1.5 * without + 0.005
 
 
 PAGES = {
