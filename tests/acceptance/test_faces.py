@@ -91,6 +91,7 @@ def test_23_pyvisa_over_a_socket(axis):
     judge_scpi(foreign.run("visa", "scpi", axis.place("scpi")))
 
 
+@pytest.mark.wide
 def test_23_pyvisa_over_a_serial_terminal(tmp_path):
     with faced(tmp_path, "--scpi", "pty") as live:
         judge_scpi(foreign.run("visa", "scpi", live.place("scpi")))
@@ -159,6 +160,7 @@ def test_27_alpyca_focuser(axis):
     assert 70_000 < found["halted"] < found["far"]
 
 
+@pytest.mark.wide
 def test_27_alpyca_rotator(tmp_path):
     with faced(tmp_path, "--alpaca", ":0", example="turntable.toml") as live:
         found = foreign.run("alpaca", "alpaca", live.place("alpaca"), "rotator")
@@ -374,7 +376,7 @@ def epics(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Epics]:
 WINDOW = 0.05  # of the example, limits.travel / 10000 [mm]
 
 
-@pytest.mark.parametrize("layer", ["pyepics", "caproto"])
+@pytest.mark.parametrize("layer", ["pyepics", pytest.param("caproto", marks=pytest.mark.wide)])
 def test_01_ophyd_epics_motor(epics, layer):
     found = epics.run("epics", "ophyd_motor", RECORD, layer, "moves")
     assert found["connected"] < 10.0
@@ -390,7 +392,7 @@ def test_01_ophyd_epics_motor(epics, layer):
     assert near(found["again"], 20.0)
 
 
-@pytest.mark.parametrize(("face", "scheme"), [("epics", "ca"), ("pva", "pva")])
+@pytest.mark.parametrize(("face", "scheme"), [("epics", "ca"), pytest.param("pva", "pva", marks=pytest.mark.wide)])
 def test_02_03_ophyd_async_motor(epics, face, scheme):
     found = epics.run(face, "ophyd_async_motor", f"{scheme}://{RECORD}")
     assert near(found["position"], 45.0)
@@ -400,6 +402,7 @@ def test_02_03_ophyd_async_motor(epics, face, scheme):
     assert found["worst"] <= WINDOW
 
 
+@pytest.mark.wide
 def test_04_bluesky_scans_also_after_a_stop(epics):
     found = epics.run("epics", "ophyd_motor", RECORD, "pyepics", "scans")
     for scan in ("first", "second", "third"):
@@ -475,6 +478,7 @@ def test_09_base_node_402_on_a_virtual_bus(still):
         judge_session(session(network, 5, sheet))
 
 
+@pytest.mark.wide
 def test_10_the_same_on_slcan_from_another_process(tmp_path):
     with wire() as (ours, theirs), faced(tmp_path, "--headless", "--canopen", f"slcan:{ours}@5") as live:
         sheet = live.place("canopen", 2).removeprefix("EDS ")
@@ -869,6 +873,7 @@ def missed(own: Any, seconds: float) -> float:
     return (after["skipped"] - before["skipped"]) / (after["periods"] - before["periods"])
 
 
+@pytest.mark.wide
 def test_28_four_faces_and_a_panel_show_the_same_sample(axis, plain):
     with connected(plain) as own:
         without = missed(own, 5.0)
