@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import can
 import canopen
 from canopen.objectdictionary.datatypes import INTEGER8, INTEGER16, INTEGER32, UNSIGNED8, UNSIGNED16, UNSIGNED32
 
@@ -406,7 +407,12 @@ async def serve(desk: Desk, address: str) -> list[str]:
         del bus["bitrate"]
     axis = await desk.open()
     network: Any = canopen.Network()
-    network.connect(**bus)
+    try:
+        network.connect(**bus)
+    except (can.CanError, OSError) as error:
+        raise DetentError(
+            f"{bus['interface']} {bus['channel']}: no such bus ({error}); name one of python-can"
+        ) from error
     node = Node(axis, number)
     node.join(network)
     desk.server = network
