@@ -62,7 +62,7 @@ def faced(
 
 def connected(live: Faced) -> Any:
     """A client of detent's own, to see what happens, and to command beside."""
-    return detent.connect(live.file)
+    return detent.connect(live.started["channel"])
 
 
 def listening(*processes: int) -> set[tuple[str, str]]:

@@ -17,7 +17,7 @@ from tests.places import ROOT
 PLACE = ROOT / ".venv-clients"
 PACKAGES = {
     "alpaca": ("alpyca==3.1.3",),
-    "can": ("canopen==2.4.1", "python-can==4.6.1", "pyserial==3.5"),
+    "can": ("canopen==2.4.1", "python-can==4.6.1", "pyserial==3.5", "msgpack==1.1.2"),
     "epics": (
         "ophyd==1.11.2", "pyepics==3.5.10", "caproto==1.3.0", "bluesky==1.15.1", "ophyd-async==0.21.3", "aioca==2.1",
         "p4p==4.3.0",
@@ -29,6 +29,9 @@ PACKAGES = {
     "zaber": ("zaber-motion==10.2.0",),
 }  # fmt: skip
 """What is in each environment: their pins fight, and some of them with those of detent."""
+
+
+MEASURED: list[float] = []  # times of a question and its answer [ms], for tests.face_table
 
 
 def missing(why: str) -> None:
@@ -80,7 +83,9 @@ def run(name: str, script: str, *words: str, timeout: float = 60.0, **environ: s
         out, err = process.communicate()
         pytest.fail(f"{script} {' '.join(words)} has not ended within {timeout:g} s\n{out[-2000:]}\n{err[-3000:]}")
     assert process.returncode == 0, f"{script} {' '.join(words)}\n{out[-2000:]}\n{err[-3000:]}"
-    return json.loads(out.strip().splitlines()[-1])
+    found: dict[str, Any] = json.loads(out.strip().splitlines()[-1])
+    MEASURED.extend(float(found[name]) for name in ("round_trip_ms",) if name in found)
+    return found
 
 
 def program(name: str, package: str) -> str:

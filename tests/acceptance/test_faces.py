@@ -10,6 +10,7 @@ import signal
 import socket
 import struct
 import subprocess
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -90,6 +91,7 @@ def test_23_pyvisa_over_a_socket(axis):
     judge_scpi(foreign.run("visa", "scpi", axis.place("scpi")))
 
 
+@pytest.mark.wide
 def test_23_pyvisa_over_a_serial_terminal(tmp_path):
     with faced(tmp_path, "--scpi", "pty") as live:
         judge_scpi(foreign.run("visa", "scpi", live.place("scpi")))
@@ -158,6 +160,7 @@ def test_27_alpyca_focuser(axis):
     assert 70_000 < found["halted"] < found["far"]
 
 
+@pytest.mark.wide
 def test_27_alpyca_rotator(tmp_path):
     with faced(tmp_path, "--alpaca", ":0", example="turntable.toml") as live:
         found = foreign.run("alpaca", "alpaca", live.place("alpaca"), "rotator")
@@ -373,7 +376,7 @@ def epics(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Epics]:
 WINDOW = 0.05  # of the example, limits.travel / 10000 [mm]
 
 
-@pytest.mark.parametrize("layer", ["pyepics", "caproto"])
+@pytest.mark.parametrize("layer", ["pyepics", pytest.param("caproto", marks=pytest.mark.wide)])
 def test_01_ophyd_epics_motor(epics, layer):
     found = epics.run("epics", "ophyd_motor", RECORD, layer, "moves")
     assert found["connected"] < 10.0
@@ -389,7 +392,7 @@ def test_01_ophyd_epics_motor(epics, layer):
     assert near(found["again"], 20.0)
 
 
-@pytest.mark.parametrize(("face", "scheme"), [("epics", "ca"), ("pva", "pva")])
+@pytest.mark.parametrize(("face", "scheme"), [("epics", "ca"), pytest.param("pva", "pva", marks=pytest.mark.wide)])
 def test_02_03_ophyd_async_motor(epics, face, scheme):
     found = epics.run(face, "ophyd_async_motor", f"{scheme}://{RECORD}")
     assert near(found["position"], 45.0)
@@ -399,6 +402,7 @@ def test_02_03_ophyd_async_motor(epics, face, scheme):
     assert found["worst"] <= WINDOW
 
 
+@pytest.mark.wide
 def test_04_bluesky_scans_also_after_a_stop(epics):
     found = epics.run("epics", "ophyd_motor", RECORD, "pyepics", "scans")
     for scan in ("first", "second", "third"):
@@ -474,6 +478,7 @@ def test_09_base_node_402_on_a_virtual_bus(still):
         judge_session(session(network, 5, sheet))
 
 
+@pytest.mark.wide
 def test_10_the_same_on_slcan_from_another_process(tmp_path):
     with wire() as (ours, theirs), faced(tmp_path, "--headless", "--canopen", f"slcan:{ours}@5") as live:
         sheet = live.place("canopen", 2).removeprefix("EDS ")
@@ -816,6 +821,92 @@ def test_29_a_second_commander_is_refused_by_each_protocol_and_may_stop(axis):
         assert (found["move"], found["stop"]) == ([4, 43], [2, 0])
         with pytest.raises(Exception, match="stop ended it"):
             moving.wait()
+
+
+Shown = dict[int, tuple[str, int, str, int]]  # by the number of the period: state, count, trust, fault
+
+
+def by_line(port: str, question: bytes, left: threading.Event, found: Shown) -> None:
+    """A client that polls a line protocol fifty times a second."""
+    with socket.create_connection(("127.0.0.1", int(port))) as line:
+        answers = line.makefile("rb")
+        while not left.wait(0.02):
+            line.sendall(question)
+            text = answers.readline().decode().strip().rpartition("-- ")[2].replace("_", " ")
+            number, state, position, trust, fault = text.split(",")
+            found[int(number)] = (state, round(float(position) * 1e3), trust, int(fault))
+
+
+def by_registers(port: str, left: threading.Event, found: Shown) -> None:
+    """The same over Modbus."""
+    from pymodbus.client import ModbusTcpClient
+
+    from detent.faces.modbus import STATES, TRUSTS, signed
+
+    client = ModbusTcpClient("127.0.0.1", port=int(port))
+    client.connect()
+    while not left.wait(0.02):
+        r = client.read_holding_registers(10, count=8).registers
+        found[r[0] << 16 | r[1]] = (STATES[r[3]], signed(r[6:8]), TRUSTS[r[4]], r[5])
+    client.close()
+
+
+def by_page(axis: Faced, left: threading.Event, found: Shown) -> None:
+    """What a panel is sent."""
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect(axis.started["channel"])
+        line.sendall(b'{"do": "watch", "rate": 50}\n')
+        for text in line.makefile():
+            s = json.loads(text).get("status")
+            if s:
+                fault = s["fault"]["code"] if s["fault"] else 0
+                found[s["loop"]["periods"]] = (s["state"], round(s["position"] * 1e6), s["trust"], fault)
+            if left.is_set():
+                return
+
+
+def missed(own: Any, seconds: float) -> float:
+    """Share of the periods that the loop skips meanwhile."""
+    before = own.status["loop"]
+    time.sleep(seconds)
+    after = own.status["loop"]
+    return (after["skipped"] - before["skipped"]) / (after["periods"] - before["periods"])
+
+
+@pytest.mark.wide
+def test_28_four_faces_and_a_panel_show_the_same_sample(axis, plain):
+    with connected(plain) as own:
+        without = missed(own, 5.0)
+    left, shown = threading.Event(), [Shown() for _ in range(5)]
+    clients = [
+        threading.Thread(target=by_line, args=(axis.port("scpi"), b"SAMP?\n", left, shown[0])),
+        threading.Thread(target=by_line, args=(axis.port("gcs"), b"SAMPLE?\n", left, shown[1])),
+        threading.Thread(target=by_line, args=(axis.port("zaber"), b"/1 detent\r\n", left, shown[2])),
+        threading.Thread(target=by_registers, args=(axis.port("modbus"), left, shown[3])),
+        threading.Thread(target=by_page, args=(axis, left, shown[4])),
+    ]
+    for one in clients:
+        one.start()
+    try:
+        with connected(axis) as own:
+            own.enable()
+            own.confirm()
+            moving = own.move_to("300 mm", speed=0.05, wait=False)
+            late = missed(own, 12.0)
+            own.stop()
+            assert moving.done
+    finally:
+        left.set()
+        for one in clients:
+            one.join()
+    compared = 0
+    for face in shown[:4]:
+        both = face.keys() & shown[4].keys()
+        compared += len(both)
+        assert all(face[number] == shown[4][number] for number in both)
+    assert compared >= 1000
+    assert len({count for _, count, _, _ in shown[4].values()}) > 100  # it did move
+    assert late <= 1.5 * without + 0.005
 
 
 PAGES = {

@@ -10,12 +10,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import can
 import canopen
 from canopen.objectdictionary.datatypes import INTEGER8, INTEGER16, INTEGER32, UNSIGNED8, UNSIGNED16, UNSIGNED32
 
 from detent.control.axis_states import ENABLED, FAULT, QUICK_STOP, STATE_NAMES, ordered
 from detent.errors import DetentError
-from detent.faces.service import AxisService, Desk, NotDoneError
+from detent.faces.service import LEASE_LOST, AxisService, Desk, NotDoneError
 from detent.faces.set_points import HALT, SetPoints
 from detent.operate.drivers import cia402 as c
 from detent.operate.drivers.canopen_drive import read_address
@@ -355,10 +356,24 @@ class Node:
         velocity = self._signed(c.VELOCITY) * self.axis.count
         velocity = min(max(velocity, -self.axis.speed), self.axis.speed)
         if velocity:
-            await self.axis.jog(velocity)
+            ending = await self.axis.jog(velocity)
             self.axis.keep()
+            self._begin(self._hold(velocity, ending))
         elif self.axis.moving:
             await self.axis.stop()
+
+    async def _hold(self, velocity: float, ending: "asyncio.Future[dict[str, Any]]") -> None:
+        """Go on where a busy processor has let the lease run out: the master still asks for it. A stop is a stop."""
+        while True:
+            try:
+                await self.axis.ended("jog", ending)
+            except NotDoneError as error:
+                if error.code != LEASE_LOST or self.state != ENABLED or self._mode != VELOCITY:
+                    return
+                ending = await self.axis.jog(velocity)
+                self.axis.keep()
+            else:
+                return
 
     async def watch(self) -> None:
         """Look after the master: gone for too long, it is as 6007 says."""
@@ -392,7 +407,12 @@ async def serve(desk: Desk, address: str) -> list[str]:
         del bus["bitrate"]
     axis = await desk.open()
     network: Any = canopen.Network()
-    network.connect(**bus)
+    try:
+        network.connect(**bus)
+    except (can.CanError, OSError) as error:
+        raise DetentError(
+            f"{bus['interface']} {bus['channel']}: no such bus ({error}); name one of python-can"
+        ) from error
     node = Node(axis, number)
     node.join(network)
     desk.server = network

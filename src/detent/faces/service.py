@@ -19,7 +19,7 @@ LOOK = 2e-3  # how often it is looked whether a motion has begun [s]
 KEEP = 0.05  # how often a jog is kept on behalf of who holds it [s]
 MOVES = "move to", "move by", "jog", "go", "home", "job"
 MOTIONS = "move_to", "move_by", "jog", "home", "stop"  # by the words that ask for them
-SECOND, BEYOND, UNREFERENCED, READ_ONLY = 43, 31, 35, 120
+LEASE_LOST, SECOND, BEYOND, UNREFERENCED, READ_ONLY = 41, 43, 31, 35, 120
 OPEN = "stop", "disable"  # to everyone, also where a face may only read
 USER_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / math.pi)}
 """Unit in which a face shows positions by that of the axis, and how many of it are one of that."""
@@ -269,9 +269,9 @@ class AxisService:
         """A value as the axis has it."""
         return value / self.scale
 
-    async def jog(self, velocity: float) -> None:
+    async def jog(self, velocity: float) -> "asyncio.Future[dict[str, Any]]":
         """Move at a velocity for as long as `hold` is called, at least every 200 ms, or until `let_go` is."""
-        await self.start("jog", self.in_si(velocity))
+        return await self.start("jog", self.in_si(velocity))
 
     async def hold(self) -> None:
         """Keep the jog for its lease."""

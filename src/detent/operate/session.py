@@ -22,6 +22,7 @@ LINES = ("stop", "disable")  # never refused
 MOST_ROWS = 2048  # of the ring, in one answer
 LARGEST = 1 << 62  # number of a row
 COUNT = 1e-6  # where a method does not say what counts the position [m]
+TRIES = 8  # to read a status while nothing changes it
 NOTE = 0.5  # how often what nobody asks for is taken down [s]
 
 
@@ -70,7 +71,17 @@ class Session:
         """The axis now."""
         keeper = self.host.keeper
         kept = {"store": keeper.told() if keeper else None, "find": self.find_position()}
-        return status_of(self.host, self.host.axis.fault()) | kept
+        return self._between_periods() | kept
+
+    def _between_periods(self) -> dict[str, Any]:
+        """Registers of one period: read while the loop waits for the next one, or again where it began meanwhile."""
+        loop, told = self.host.board.loop, dict[str, Any]()
+        for _ in range(TRIES):
+            rows = loop.rows  # the row of a period is written at its end
+            told = status_of(self.host, self.host.axis.fault())
+            if rows == loop.rows == loop.periods:
+                break
+        return told
 
     def find_position(self) -> str:
         """The command that makes a position known: to home, or of an axis that cannot a person's word for it."""
