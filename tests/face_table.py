@@ -8,6 +8,7 @@ import re
 import sys
 
 import pytest
+
 from tests import foreign
 from tests.places import ROOT
 
