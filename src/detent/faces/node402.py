@@ -260,6 +260,8 @@ class Node:
             self._velocity = int.from_bytes(data, "little", signed=True)  # what is stored is not yet that
             self._loop.call_soon_threadsafe(self._words.put_nowait, None)
         elif index == c.CONTROL:
+            if self._mode == HOMING and value & NEW and not self._word & NEW:
+                self._homed = False  # at once: a master that looks now must not see the reference of before
             self._loop.call_soon_threadsafe(self._words.put_nowait, value)
 
     def _beat(self, *_: Any) -> None:
