@@ -449,7 +449,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Faced]:
 def still(plain: Faced) -> Faced:
     """The same, off, without a fault, at rest, commanded by nobody."""
     with connected(plain) as own:
-        own.do("take")
+        until(lambda: own.status["client"] == 0 and own.status["rests"])  # who was there before has left
         own.disable()
         if own.status["fault"]:
             own.inject("nothing")

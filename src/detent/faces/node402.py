@@ -123,10 +123,10 @@ class Node:
             parts[0].default = sum(1 for k in range(1, 5) if parts[k].default)
         self.node: Any = canopen.LocalNode(node, dictionary)
         self.set_points = SetPoints(axis.counts)
-        self._words: asyncio.Queue[int] = asyncio.Queue()
+        self._words: asyncio.Queue[int | None] = asyncio.Queue()
         self._word, self._mode, self._error, self._told_fault = 0, POSITION, 0, 0
         self._limited = self._homing = self._homed = self._home_failed = False
-        self._heard, self._limit, self._master = 0.0, 0.0, 0
+        self._heard, self._limit, self._master, self._velocity = 0.0, 0.0, 0, 0
         self._motion: asyncio.Future[None] | None = None
         self.node.add_read_callback(self._read)
         self.node.add_write_callback(self._written)
@@ -210,7 +210,7 @@ class Node:
             word |= (REACHED if idle and not axis.moving else 0) | (MODE_BIT if self.set_points.acknowledged else 0)
         elif self._mode == VELOCITY:
             still = abs(axis.velocity) < 0.01 * axis.speed
-            wanted = self._signed(c.VELOCITY) * axis.count
+            wanted = self._velocity * axis.count
             word |= (MODE_BIT if still else 0) | (REACHED if abs(axis.velocity - wanted) < 0.02 * axis.speed else 0)
         else:
             word |= (MODE_BIT if self._homed else 0) | (MODE_ERROR if self._home_failed else 0)
@@ -256,9 +256,12 @@ class Node:
             self.node.network.subscribe(HEARTBEAT + self._master, self._beat)
         elif index & ~0x3FF in (0x1400, 0x1800) or index & ~0x1FF in (0x1600, 0x1A00):
             self._loop.call_soon_threadsafe(self._loop.call_later, LOOK, self._listen)  # once it is kept
-        elif index == c.VELOCITY and self._mode == VELOCITY:
-            self._loop.call_soon_threadsafe(self._words.put_nowait, self._word)
+        elif index == c.VELOCITY:
+            self._velocity = int.from_bytes(data, "little", signed=True)  # what is stored is not yet that
+            self._loop.call_soon_threadsafe(self._words.put_nowait, None)
         elif index == c.CONTROL:
+            if self._mode == HOMING and value & NEW and not self._word & NEW:
+                self._homed = False  # at once: a master that looks now must not see the reference of before
             self._loop.call_soon_threadsafe(self._words.put_nowait, value)
 
     def _beat(self, *_: Any) -> None:
@@ -274,7 +277,8 @@ class Node:
     async def obey(self) -> None:
         """Control words, one by one."""
         while True:
-            word_ = await self._words.get()
+            new = await self._words.get()
+            word_ = self._word if new is None else new  # None: as before, at another velocity
             before, self._word = self._word, word_
             try:
                 await self._lead(word_, before)
@@ -353,7 +357,7 @@ class Node:
 
     async def _run(self) -> None:
         """Profile velocity: a jog that is kept for as long as the drive is enabled."""
-        velocity = self._signed(c.VELOCITY) * self.axis.count
+        velocity = self._velocity * self.axis.count
         velocity = min(max(velocity, -self.axis.speed), self.axis.speed)
         if velocity:
             ending = await self.axis.jog(velocity)
@@ -382,7 +386,9 @@ class Node:
             if not 0.0 < self._limit < time.monotonic() - self._heard or self._error:
                 continue
             option, self._limit = self._signed(c.ABORT), 0.0  # until it asks to be watched again
-            self.axis.let_go()
+            self.axis.let_go()  # a velocity ends with its lease, whatever the option
+            if self._motion is not None and self._mode == VELOCITY:
+                self._motion.cancel()
             self.set_points.drop(self.axis.counts)
             if option == 1:
                 self._error = NO_MASTER

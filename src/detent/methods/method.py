@@ -501,7 +501,9 @@ class Method(Protocol[SpecT]):
 
     def sensor(self, spec: SpecT, motor: str = "") -> "PositionSensor | None":
         """What counts the position of one motor, or of the only one; None where the method does not say."""
-        motors: Mapping[str, PositionSensor] = self.sensors(spec) if self.senses else {}
+        if not self.senses:
+            return None
+        motors = self.sensors(spec)
         return next(iter(motors.values())) if len(motors) == 1 else motors.get(motor)
 
     def compare(self, spec: SpecT, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
