@@ -13,7 +13,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -821,6 +821,55 @@ def test_29_a_second_commander_is_refused_by_each_protocol_and_may_stop(axis):
         assert (found["move"], found["stop"]) == ([4, 43], [2, 0])
         with pytest.raises(Exception, match="stop ended it"):
             moving.wait()
+
+
+@contextmanager
+def stopped_by_another(live: Faced) -> Iterator[Any]:
+    """Somebody leads a move from 20 mm, and has it ended by a stop of another before it arrives."""
+    with connected(live) as own:
+        own.do("take")
+        own.enable()
+        own.confirm()
+        own.move_to("20 mm")
+        moving = own.move_to("450 mm", speed=0.05, wait=False)
+        yield own
+        with pytest.raises(Exception, match="stop ended it"):
+            moving.wait()
+        own.do("leave")
+
+
+def test_29_a_second_commander_by_epics_is_refused_and_may_stop(epics):
+    with stopped_by_another(epics.live):
+        found = epics.run("epics", "ophyd_motor", RECORD, "pyepics", "refused")
+        assert found["put"] == "ErrorResponseReceived"
+        assert found["set_point"] != 60.0
+
+
+def test_29_a_second_commander_by_grbl_is_refused_and_may_stop(axis):
+    with connected(axis) as own:
+        own.do("take")
+        own.enable()
+        client = foreign.start("grbl", "grbl", axis.place("grbl"), "refused")
+        assert json.loads(client.stdout.readline()) == {"move": ["error:9"]}
+        with pytest.raises(Exception, match="stop ended it"):  # whose connection is not at rest begins with a stop
+            own.move_to("450 mm", speed=0.05)
+        own.do("leave")
+        assert client.wait(20) == 0, client.stderr.read()
+        client.communicate()
+
+
+@pytest.mark.parametrize("word", [0x0B, 0x10F])  # quick stop, halt
+def test_29_a_second_master_sees_that_the_drive_is_not_remote_and_may_stop(still, word):
+    with drive_on_virtual(still, f"second {word}") as (_, network, sheet), stopped_by_another(still) as own:
+        node = remote(network, sheet)
+        assert not node.sdo[0x6041].raw >> 9 & 1
+        running = own.status["running"]
+        node.sdo[0x607A].raw = 60_000
+        node.sdo[0x6040].raw = 0x0F
+        node.sdo[0x6040].raw = 0x1F
+        time.sleep(0.3)
+        assert own.status["running"]["id"] == running["id"]
+        node.sdo[0x6040].raw = word
 
 
 Shown = dict[int, tuple[str, int, str, int]]  # by the number of the period: state, count, trust, fault

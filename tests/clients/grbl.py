@@ -28,6 +28,17 @@ until(lambda: came("on_boot"))
 streamer.poll_start()
 until(lambda: streamer.cmode == "Idle")
 time.sleep(0.3)
+if "refused" in sys.argv:
+    streamer.send_immediately("G1 X60 F6000")
+    until(lambda: came("on_error"))
+    print(json.dumps({"move": [event[1] for event in events if event[0] == "on_error"]}), flush=True)
+    place = streamer.cmpos[0]
+    until(lambda: abs(streamer.cmpos[0] - place) > 1.0)
+    streamer.softreset()
+    time.sleep(0.5)
+    streamer.poll_stop()
+    streamer.disconnect()
+    raise SystemExit
 streamer.incremental_streaming = True
 lines = ["G21", "G90", *(f"G1 X{40 + k} F6000" for k in range(18))]
 streamer.write("\n".join(lines))

@@ -70,6 +70,17 @@ elif what == "pulse":
     done.wait(10)
     time.sleep(0.1)
     found["seen"] = seen
+elif what == "refused":
+    from caproto.sync.client import write  # which tells how a put ended
+
+    try:
+        write(name, 60.0, notify=True, timeout=5)
+    except Exception as error:
+        found["put"] = type(error).__name__
+    motor.user_setpoint.put(60.0, wait=False)
+    time.sleep(0.5)
+    found["set_point"] = motor.user_setpoint.get()
+    motor.motor_stop.put(1, wait=True)
 elif what == "jog":
     forward = EpicsSignal(f"{name}.JOGF")
     speed = EpicsSignal(f"{name}.JVEL")

@@ -14,7 +14,7 @@ import can
 import canopen
 from canopen.objectdictionary.datatypes import INTEGER8, INTEGER16, INTEGER32, UNSIGNED8, UNSIGNED16, UNSIGNED32
 
-from detent.control.axis_states import ENABLED, FAULT, QUICK_STOP, STATE_NAMES, ordered
+from detent.control.axis_states import ENABLED, FAULT, HALT_QUICKLY, QUICK_STOP, STATE_NAMES, ordered
 from detent.errors import DetentError
 from detent.faces.service import LEASE_LOST, AxisService, Desk, NotDoneError
 from detent.faces.set_points import HALT, SetPoints
@@ -300,10 +300,17 @@ class Node:
             return
         for order in () if self._error else c.orders_of(word_, self.state):
             if ordered(self.state, order) != self.state:
-                await self.axis.do("order", order)
+                await self._order(order)
                 if self.state == ENABLED:
                     self.set_points.drop(self.axis.counts)
                     await self.axis.enable()  # confirms the first motion, of a simulated axis
+
+    async def _order(self, order: int) -> None:
+        """One of the orders of a control word; a quick stop is taken from everybody."""
+        if order == HALT_QUICKLY and (self.axis.is_others or not self.axis.commands):
+            await self.axis.stop()
+        else:
+            await self.axis.do("order", order)
 
     async def _move(self, word_: int, before: int) -> None:
         """What the mode makes of the bits."""
@@ -397,7 +404,7 @@ class Node:
             elif option == 2:
                 await self.axis.do("disable")
             elif option == 3 and self.state not in (QUICK_STOP, FAULT):
-                await self.axis.do("order", 5)
+                await self._order(HALT_QUICKLY)
             self.publish()
 
 

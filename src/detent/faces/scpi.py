@@ -339,13 +339,13 @@ async def _(talk: Scpi, values: list[str]) -> None:
 @command("POSition?", "position")
 async def _(talk: Scpi, _values: list[str]) -> str:
     await talk.axis.refresh()
-    return repr(talk.axis.position)
+    return shown(talk.axis.position)
 
 
 @command("VELocity?", "velocity [unit/s]")
 async def _(talk: Scpi, _values: list[str]) -> str:
     await talk.axis.refresh()
-    return repr(talk.axis.velocity)
+    return shown(talk.axis.velocity)
 
 
 @command("STATe?", "state, as CiA 402 names it")
@@ -380,12 +380,12 @@ async def _(talk: Scpi, _values: list[str]) -> str:
 @command("LIMits?", "soft limits; two numbers that are none where there are none")
 async def _(talk: Scpi, _values: list[str]) -> str:
     low, high = talk.axis.limits or (9.91e37, 9.91e37)  # not a number, as SCPI writes it
-    return f"{low!r},{high!r}"
+    return f"{shown(low)},{shown(high)}"
 
 
 @command("SPEed:MAXimum?", "largest speed [unit/s]")
 async def _(talk: Scpi, _values: list[str]) -> str:
-    return repr(talk.axis.speed)
+    return shown(talk.axis.speed)
 
 
 @command("UNIT?", "unit of positions")
@@ -409,6 +409,11 @@ async def _(_talk: Scpi, _values: list[str]) -> str:
 
 
 PATTERNS = [(pattern_of(header), done) for header, done in COMMANDS.items()]
+
+
+def shown(value: float) -> str:
+    """A number of the axis, without what its unit has left behind the twelfth digit."""
+    return f"{value:.12g}"
 
 
 async def serve(desk: Desk, address: str) -> list[str]:
