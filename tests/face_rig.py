@@ -15,8 +15,10 @@ from typing import Any
 import pytest
 
 import detent
+from detent.axisfile.tables import FacesTable
 from tests.live_processes import STARTED, Running
 
+FACE_KEYS = {f"faces.{name}" for name in FacesTable.model_fields}  # which no register hears
 PERIOD = "10 ms"  # of the loop: this machine has no real-time priority, and two processors for all
 
 

@@ -71,11 +71,11 @@ elif what == "pulse":
     time.sleep(0.1)
     found["seen"] = seen
 elif what == "refused":
-    from caproto.sync.client import write  # which tells how a put ended
+    from caproto.sync.client import ErrorResponseReceived, write  # which tells how a put ended
 
     try:
         write(name, 60.0, notify=True, timeout=5)
-    except Exception as error:
+    except ErrorResponseReceived as error:
         found["put"] = type(error).__name__
     motor.user_setpoint.put(60.0, wait=False)
     time.sleep(0.5)

@@ -8,14 +8,16 @@ that of the motor.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from detent.errors import FileProblem, InputError
 from detent.files.fields import Table, required, rows
 from detent.files.quantities import Time
 from detent.files.source import Source
 from detent.kernel.registers import Field, Registers
-from detent.record.machine import Machine
+
+if TYPE_CHECKING:
+    from detent.record.machine import Machine  # loads the compiler
 
 
 class ChangeRow(Table, frozen=True):
@@ -65,7 +67,7 @@ def changes_of(job: Any, motor: str = "") -> tuple[ParameterChange, ...]:
     return tuple(sorted(own, key=lambda one: one.time))
 
 
-def lay_changes(machines: Mapping[str, Machine[Any, Any]], job: Any) -> None:
+def lay_changes(machines: "Mapping[str, Machine[Any, Any]]", job: Any) -> None:
     """Have the motors of a simulated axis change parameters of their controllers; a single one has the name "".
 
     Refused, each with its line: a name that is none of a parameter, an option, a table, a value that does not fit.
@@ -82,7 +84,7 @@ def _writer(change: ParameterChange) -> Callable[[Any], None]:
     return lambda params: change.store(params.controller)
 
 
-def _problems(machines: Mapping[str, Machine[Any, Any]], one: ParameterChange, file: str) -> list[FileProblem]:
+def _problems(machines: "Mapping[str, Machine[Any, Any]]", one: ParameterChange, file: str) -> list[FileProblem]:
     """What is wrong with a change."""
     motor, _, name = ("", "", one.name) if "" in machines else one.name.partition(".")
     allowed, remedy = "a tunable number of the controller", "take a name of params.csv of an export"

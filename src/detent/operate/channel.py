@@ -37,7 +37,7 @@ MOST_BEHIND = 256  # messages of a client that wait behind one that waits for a 
 MOST_WAITING = 1 << 20  # bytes that a client has not read until it is dropped
 SLOW = 1 << 16  # bytes that it has not read until it is sent no rows
 LEAVING = 0.5  # for what is still to be sent to a client that leaves [s]
-LEAVES = 20  # times that it is asked to let others command, and that the end of that is looked for
+LEAVES = 20  # times that it is asked to let others command, at most
 LOOK = 2e-3  # how often endings are looked for [s]
 UNTOLD = {"keep"}  # twenty a second: of the jog that they keep there is a record
 RATES = 1.0, 50.0  # of a watch [Hz]
@@ -167,12 +167,13 @@ class Channel:
         for _ in range(LEAVES):
             with suppress(BlockingIOError):  # the lease of a jog runs out by itself
                 command = self.session.ask("leave", client=client.number)
-                for _ in range(LEAVES):
-                    if (ended := self.session.ending(command)) is not None and ended.code != STALE:
-                        return
-                    if ended is not None or not self.session.host.is_running:
-                        break
+                until = self._loop.time() + LEAVING
+                while (ended := self.session.ending(command)) is None:
+                    if not self.session.host.is_running or self._loop.time() > until:
+                        return  # nothing has been refused
                     await asyncio.sleep(LOOK)
+                if ended.code != STALE:
+                    return
 
     def _note_lost(self, client: Client) -> None:
         """Say who was lost, where what it had begun is still under way and comes to rest now."""

@@ -128,7 +128,8 @@ def test_the_schema_has_a_placeholder_where_the_user_has_a_name():
     assert ("rail", "NAME", "stop", "NUMBER", "at") in paths
     placed = next(path for path in paths if path[-1] == "at")
     assert [isinstance(part, AnyName) for part in placed] == [False, True, False, True, False]
-    assert [row.key for row in reference_rows("yard")][3:5] == ["rail.NAME.travel", "rail.NAME.motor.catalogue"]
+    keys = [row.key for row in reference_rows("yard") if not row.key.startswith("faces.")]
+    assert keys[3:5] == ["rail.NAME.travel", "rail.NAME.motor.catalogue"]
 
 
 def test_named_tables_are_told_from_others():

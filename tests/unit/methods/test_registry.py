@@ -11,7 +11,7 @@ import pytest
 from tests.dump import dump_spec
 from tests.reference import reference_rows
 
-from detent.axisfile.tables import AxisSpec, AxisTable
+from detent.axisfile.tables import AxisSpec, AxisTable, FacesTable
 from detent.errors import DetentError, InputError
 from detent.files.fields import leaf_fields, optional, options_of, required
 from detent.files.findings import Caution, Contradiction, count_figure, quantity_figure
@@ -23,6 +23,7 @@ from detent.methods.method import Method
 from detent.methods.registry import METHODS
 
 AXIS = ("axis.name", "axis.method", "axis.creep")  # keys of every method
+FACES = [f"faces.{name}" for name in FacesTable.model_fields]  # the same
 
 
 class SledAxisTable(AxisTable, frozen=True):
@@ -128,7 +129,7 @@ def test_defaults_rules_and_reports_are_those_of_the_method(load_text):
     assert report.warnings == ()
     assert [caution.name for caution in check_spec(load_text(SLED_TEXT, "travel=10 m")).warnings] == ["travel"]
     assert problem_of(load_text, "park", SLED_TEXT, "park=3 m").allowed == "up to travel"
-    assert [row.key for row in reference_rows("sled")] == [*AXIS, "travel", "park"]
+    assert [row.key for row in reference_rows("sled")] == [*AXIS, *FACES, "travel", "park"]
     assert load_text(dump_spec(axis.spec)).spec == axis.spec
 
 

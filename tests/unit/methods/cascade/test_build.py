@@ -11,6 +11,7 @@ import pytest
 from tests.bad_files import example_text
 from tests.cascade_rig import Rig
 from tests.difference import diff
+from tests.face_rig import FACE_KEYS
 from tests.reference import reference_rows
 
 from detent.files.source import parse_source
@@ -124,7 +125,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
 # Keys of a rotary axis, of what is said about it, and of the host that runs it.
 ROTARY = {"axis.motion", "mechanics.pendulum", "method.feed_forward.model.pendulum"}
 SAID = {"hardware.id", "axis.name", "axis.method"}
-HOST = {"method.timeout", "axis.creep"}
+HOST = {"method.timeout", "axis.creep"} | FACE_KEYS
 
 GUARDED = {
     "limits.travel": "0.4 m",
