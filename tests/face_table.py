@@ -20,7 +20,7 @@ CLIENTS = {
     "test_04_bluesky_scans_also_after_a_stop": ("EPICS, Channel Access", "bluesky 1.15.1"),
     "test_09_base_node_402_on_a_virtual_bus": ("CiA 402, virtual bus", "canopen 2.4.1"),
     "test_10_the_same_on_slcan_from_another_process": ("CiA 402, slcan", "canopen 2.4.1"),
-    "test_11_the_same_on_udp_multicast_with_the_filters_that_are_printed": ("CiA 402, multicast", "canopen 2.4.1"),
+    "test_11_the_same_on_udp_multicast_with_the_filters_that_are_printed[2]": ("CiA 402, multicast", "canopen 2.4.1"),
     "test_19_mbpoll": ("Modbus TCP", "mbpoll 1.4.11"),
     "test_20_modbus_serial": ("Modbus TCP", "modbus-serial 8.0.25"),
     "test_20_pymodbus": ("Modbus TCP", "pymodbus 3.16.1"),

@@ -488,12 +488,12 @@ def test_10_the_same_on_slcan_from_another_process(tmp_path):
 GROUP = "239.74.163.2"
 
 
-@pytest.mark.wide
-def test_11_the_same_on_udp_multicast_with_the_filters_that_are_printed(tmp_path):
+@pytest.mark.parametrize("runs", [pytest.param(2, marks=pytest.mark.wide), pytest.param(20, marks=pytest.mark.long)])
+def test_11_the_same_on_udp_multicast_with_the_filters_that_are_printed(tmp_path, runs):
     with faced(tmp_path, "--headless", "--canopen", f"udp_multicast:{GROUP}@5") as live:
         sheet = live.place("canopen", 2).removeprefix("EDS ")
         filters = live.place("canopen", 1).removeprefix("can_filters ").split(", ")
-        for _ in range(20):
+        for _ in range(runs):
             judge_session(foreign.run("can", "p402", "udp_multicast", GROUP, "5", sheet, *filters))
 
 

@@ -21,7 +21,7 @@ from detent.files.text import placing
 
 pytestmark = [pytest.mark.early, pytest.mark.wide, pytest.mark.compiled]
 
-KILLS, SOON = 15, 6  # of each command; of these in `make test-wide`
+KILLS, SOON = 15, 3  # of each command; of these in `make test-wide`
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 HEAD, LETTER, ZOOM = (str(detent.example(name)) for name in ("print_head.toml", "letter.txt", "zoom.toml"))
 # The date of a run is part of its evidence: the same for all.
