@@ -248,7 +248,8 @@ def texts(  # noqa: PLR0913 - what the files tell of
     given = {
         "name": name, "NAME": name.upper(), "begins": unit.begins, "version": __version__,
         "about": about, "tick": tick, "large": LARGE,
-        "source_hash": source_hash, "axis_hash": short_hash(bytes(params)), "layout_hash": f"{unit.layout_hash:08X}",
+        "source_hash": source_hash, "layout_hash": f"{unit.layout_hash:08X}",
+        "axis_hash": short_hash(bytes(unit.as_stated(params))),
         "structs": struct_texts(program, (unit.params, unit.controller, unit.lines)), "signals": signals_text(program),
         "flash": FLASH_INCLUDE if f"#define {name.upper()}_FLASH" in signals_text(program) else "",
         "prototypes": "".join(_prototype(program, f) for f in program.steps.values() if f.entry),

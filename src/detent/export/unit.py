@@ -59,6 +59,14 @@ class ControlUnit:
                 setattr(registers, declared.name, fit.values[type(registers), declared.name])
         return replace(self, fit=fit)
 
+    def as_stated(self, params: Registers) -> Registers:
+        """A copy of parameters of which none says how much of an array is used: as the axis file gives them."""
+        stated = params.copy()
+        for _, registers, declared, _ in every(stated):
+            if (type(registers), declared.name) in self.fit.values:
+                setattr(registers, declared.name, 0)
+        return stated
+
     @property
     def told_fit(self) -> dict[str, dict[str, Any]]:
         """Its fit as plain data, by the names of class and register."""
