@@ -1,5 +1,6 @@
 """ophyd's EpicsMotor, by pyepics or by caproto: connect, move, limit, stop; scans; the pulse of a null move; jogs."""
 
+import faulthandler
 import json
 import sys
 import threading
@@ -11,6 +12,7 @@ ophyd.set_cl(sys.argv[2])
 from bluesky import RunEngine, plans  # noqa: E402 - the layer is chosen first
 from ophyd import EpicsMotor, EpicsSignal, EpicsSignalRO  # noqa: E402
 
+faulthandler.dump_traceback_later(45)
 name, _, what = sys.argv[1:4]
 motor = EpicsMotor(name, name="motor")
 begin = time.monotonic()

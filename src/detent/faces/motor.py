@@ -16,6 +16,7 @@ MAJOR, STATE_ALARM = 2, 7  # severity and status of a fault
 POSITIVE, AT_PLUS, AT_POSITION, SLIP, HAS_ENCODER, PROBLEM, MOVING, AT_MINUS, HOMED, DONE = (
     1 << bit for bit in (0, 2, 5, 6, 8, 9, 10, 13, 14, 1)
 )  # of MSTA
+MOTIONS = "VAL", "DVAL", "RVAL", "RLV", "TWF", "TWR", "JOGF", "JOGR", "HOMF", "HOMR"  # fields that begin one
 COUNTS = 1000  # of a revolution, as the record counts them: the axis does not say how many its motor makes
 Show = Callable[[Mapping[str, Any]], Awaitable[None]]
 
@@ -37,11 +38,13 @@ class Motor:
             "SREV": COUNTS, "UREV": COUNTS * axis.count, "OUT": "@detent", "DESC": axis.about["name"][:40],
         }  # fmt: skip
         self._moves = 0  # motions that clients wait for
-        self._asked = 0  # set-points so far
         self._ends = (low, high)
         self._jogs = False
         self.severity = self.status = 0
         self.fields |= self._seen() | self._coordinates()
+        self._stops = self._stopping = 0  # stops that have come, and that are under way
+        self._free = asyncio.Event()
+        self._free.set()
         self._fresh = asyncio.Event()
         axis.subscribe(self._fresh.set)
         self.actions: dict[str, Callable[[Any], Awaitable[None]]] = {
@@ -116,7 +119,8 @@ class Motor:
         """The newest sample; a motion that nobody waits for, as from the panel, is shown as one."""
         seen = self._seen()
         if not self._moves:
-            seen |= {"DMOV": int(not self.axis.moving), "MIP": 0}
+            stands = self._stopping and self.fields["DMOV"]  # a stop of what stands is no motion: no pulse
+            seen |= {"DMOV": int(bool(stands) or not self.axis.moving), "MIP": 0}
             if self.axis.moving and not self._jogs:  # somebody else moves it: the set-point follows, as it does in SYNC
                 seen |= {"VAL": self.user(self.axis.commanded)}
         self.severity, self.status = (MAJOR, STATE_ALARM) if self.axis.fault else (0, 0)
@@ -137,8 +141,14 @@ class Motor:
 
     async def put(self, field: str, value: Any) -> None:
         """A client's put; it is complete when what it has begun is done. What is refused is an error."""
-        if field in self.actions:
-            await self.actions[field](value)
+        if field not in self.actions:
+            return
+        stops = self._stops
+        if field != "STOP":
+            await self._free.wait()  # a put behind a stop comes behind its end, which would cut what it begins
+            if field in MOTIONS and stops != self._stops:
+                return  # another stop has come meanwhile
+        await self.actions[field](value)
 
     async def _keep(self, field: str, value: Any) -> None:
         await self.change({field: value})
@@ -155,7 +165,6 @@ class Motor:
         if self.axis.limits and low < high and not low <= user <= high:
             await self.change({"LVIO": 1})
             raise NotDoneError("move_to", "refused", 31, f"beyond the limits, {low:g} to {high:g} {self.axis.unit}")
-        self._asked += 1
         await self.change({"VAL": user, "LVIO": 0})
         await self._motion(self.axis.move_to(self.dial(user), self.fields["VELO"]))
         if self.fields["SPMG"] == MOVE:
@@ -168,11 +177,12 @@ class Motor:
 
     async def _motion(self, motion: Awaitable[None]) -> None:
         """Lead a motion to its end: DMOV is 0 meanwhile, and 1 only behind the read-back of its end."""
-        self._moves += 1
+        self._moves, stops = self._moves + 1, self._stops
         await self.change({"DMOV": 0, "MOVN": 1, "MIP": 0x20})
         try:
             await self.axis.enable()
-            await motion
+            if stops == self._stops:  # nobody has stopped it before it could begin
+                await motion
         except NotDoneError as error:
             if error.how != "aborted":  # a stop, or another set-point, has taken its place
                 await self.change({"VAL": self.user(self.axis.commanded)})
@@ -229,23 +239,40 @@ class Motor:
         await self.change({"VAL": self.user(self.axis.commanded), field: 0})
         await self.show_sample()
 
+    async def _halt(self) -> None:
+        """Come to rest; puts that arrive meanwhile wait for that."""
+        self._stops += 1
+        self._stopping += 1
+        self._free.clear()
+        try:
+            await self.axis.stop()
+        finally:
+            self._jogs = False
+            self._stopping -= 1
+
+    def _go_on(self) -> None:
+        """What waits behind the last stop may begin."""
+        if not self._stopping:
+            self._free.set()
+
     async def _stop(self, value: int) -> None:
         """Stop, and be ready for the next time: also when it stood."""
         if value:
-            asked = self._asked
             try:
-                await self.axis.stop()
+                await self._halt()
             finally:
-                self._jogs = False
-                after = {"VAL": self.user(self.axis.commanded)} if asked == self._asked else {}  # no new one meanwhile
-                await self.change({"STOP": 0, "JOGF": 0, "JOGR": 0} | after)
+                await self.change({"STOP": 0, "JOGF": 0, "JOGR": 0, "VAL": self.user(self.axis.commanded)})
+                self._go_on()
 
     async def _mode(self, value: int) -> None:
         before, target = self.fields["SPMG"], self.fields["VAL"]
         await self.change({"SPMG": value, "LSPG": before})
         if value in (STOP, PAUSE) and self.axis.moving:
-            await self.axis.stop()
-            await self.change({"VAL": target if value == PAUSE else self.user(self.axis.commanded)})
+            try:
+                await self._halt()
+                await self.change({"VAL": target if value == PAUSE else self.user(self.axis.commanded)})
+            finally:
+                self._go_on()
         elif value in (MOVE, GO) and before == PAUSE:
             await self._go(target)
 

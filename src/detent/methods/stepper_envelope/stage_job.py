@@ -225,7 +225,7 @@ def places_of(table: Table | None, motors: Sequence[str]) -> dict[str, float]:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class StopChange:
     """A stop extreme changed on the way.
 
     Attributes
@@ -256,7 +256,7 @@ class StageMove:
     turn : float or None
         Where the motor turns before it goes to its target [m], the turn extreme of its envelope: it runs on to there
         and comes back in the same move. Only where exactly one motor moves.
-    change : Change or None
+    change : StopChange or None
         A stop extreme changed on the way. Only where exactly one motor moves, and without `turn`: the motor would pass
         one place twice.
 
@@ -273,7 +273,7 @@ class StageMove:
     dwell: float = 0.0
     label: str = ""
     turn: float | None = None
-    change: Change | None = None
+    change: StopChange | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no stage could do."""
@@ -399,7 +399,7 @@ def _make_move(line: int, row: StageRow) -> tuple[StageMove | StageJog, int]:
     if row.jog is not None:
         return StageJog(1, line, row.jog, row.speed or 0.0, row.duration or 0.0, row.dwell, label), row.repeat
     at, to = row.changed_at, row.changed_to
-    change = None if at is None or to is None else Change(at, to)
+    change = None if at is None or to is None else StopChange(at, to)
     targets, by = places_of(row, row.motors), places_of(row.by, row.motors)
     return StageMove(1, line, targets, by, row.dwell, label, row.turn, change), row.repeat
 
