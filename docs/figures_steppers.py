@@ -250,7 +250,7 @@ def boundary() -> None:
 
 def stop_moved() -> None:
     """A run whose stop is moved on the way: outwards, inwards, and nearer than it can stop."""
-    from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageMove
+    from detent.methods.stepper_envelope.stage_job import StageJob, StageMove, StopChange
 
     cases = ((15.5e-3, ORANGE, 3.5), (16.135e-3, GREEN, 1.4), (20e-3, BLUE, 1.4))
     signals = tuple(
@@ -261,7 +261,7 @@ def stop_moved() -> None:
     with picture("stop-moved.png", 1, 3.8) as (area,):
         area.axhline(0, color=GREY, linewidth=0.8)
         for to, colour, width in cases:
-            change = Change(15e-3, to)
+            change = StopChange(15e-3, to)
             move = StageMove(1, 1, {MOTOR: 40e-3}, change=change)
             done = axis.run(StageJob("moved", "moves", (move,), (MOTOR,)), signals=signals, every=25)
             trace = done.trace
