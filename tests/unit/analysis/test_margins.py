@@ -16,7 +16,9 @@ from detent.methods.load import load_spec
 FINEST = 400_000  # frequencies
 
 
-@pytest.mark.parametrize("axes", [6, pytest.param(300, marks=pytest.mark.wide)])
+@pytest.mark.parametrize(
+    "axes", [6, pytest.param(60, marks=pytest.mark.wide), pytest.param(300, marks=pytest.mark.long)]
+)
 def test_nothing_lies_between_the_points_of_the_grid(axes):
     chance = random.Random(7)
     for _ in range(axes):
