@@ -777,9 +777,10 @@ def test_28_what_the_longest_tick_of_each_takes(counted, method):
         assert 0.1 * bar < entries[f"{read_manifest(folder)['name']}_control"].most <= bar
 
 
+# A print head's are those of a whole letter.
 @pytest.mark.parametrize("method", [
-    "phase_servo", *(pytest.param(one, marks=pytest.mark.wide) for one in JOBS if one not in ("phase_servo", "print_head")),
-    pytest.param("print_head", marks=pytest.mark.long),  # a letter, call by call
+    "phase_servo", pytest.param("print_head", marks=pytest.mark.long),
+    *(pytest.param(one, marks=pytest.mark.wide) for one in JOBS if one not in ("phase_servo", "print_head")),
 ])  # fmt: skip
 def test_27_28_calls_as_the_specification_lists_them(tmp_path, method):
     """Instructions and stack of each call, in every state to which the job of the simulation comes."""
