@@ -82,7 +82,7 @@ from detent.methods.print_head.print_job import load_job
 from detent.methods.print_head.run import SimulatedPrinting, print_job
 from detent.methods.registry import METHODS
 from detent.methods.stepper_envelope.host import StageHost
-from detent.methods.stepper_envelope.stage_job import Change, StageMove
+from detent.methods.stepper_envelope.stage_job import StageMove, StopChange
 from detent.operate.drivers.canopen_drive import CanopenDrive
 from detent.operate.faults import injection_of
 from detent.operate.host import Ending, Host, Log, repeat
@@ -1088,7 +1088,7 @@ def test_25_an_end_position_moved_during_a_run_shortens_the_ramp():
         axis.until_rest()
         assert axis.rule.position == stop
         simulated = StageHost(axis.spec)
-        change = Change(axis.table.position_of(at), axis.table.position_of(new))
+        change = StopChange(axis.table.position_of(at), axis.table.position_of(new))
         task = StageMove(1, 0, targets={"group_a": 0.04}, change=change)
         assert not simulated.run(task)[1]
         motor = simulated.stage.motors["group_a"]

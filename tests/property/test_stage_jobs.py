@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from detent.errors import InputError
-from detent.methods.stepper_envelope.stage_job import Change, StageJog, load_stage_job
+from detent.methods.stepper_envelope.stage_job import StageJog, StopChange, load_stage_job
 
 MOTORS = ("x", "y", "group_a")
 LENGTHS = {"m": Fraction(1), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6), "in": Fraction(127, 5000)}
@@ -79,7 +79,7 @@ def moves(draw):
     if kind == "change":
         at, to = draw(lengths), draw(lengths)
         lines += [assigned("changed_at", at), assigned("changed_to", to)]
-        change = Change(si(at, LENGTHS), si(to, LENGTHS))
+        change = StopChange(si(at, LENGTHS), si(to, LENGTHS))
     said = [{motor: si(way, LENGTHS) for motor, way in found.items()} for found in (targets, by)]
     return lines, (*said, turn, change)
 

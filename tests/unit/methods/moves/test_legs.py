@@ -14,7 +14,7 @@ from detent.methods.rotary_table.live import sequence_legs
 from detent.methods.rotary_table.sequence_file import load_sequence
 from detent.methods.rotary_table.sequence_job import Go, Jog, Repeat, SequenceJob, Wait
 from detent.methods.stepper_envelope.live import stage_legs
-from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageJog, StageMove
+from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove, StopChange
 
 
 def test_ways_count_from_the_target_before_and_first_from_where_the_axis_is():
@@ -53,7 +53,7 @@ def test_a_motor_makes_its_own_moves_and_no_others():
         stage_legs("x", replace(job, moves=(jog, moves[0])))
     with pytest.raises(DetentError, match="got moves of x"):
         stage_legs("y", job)
-    turned = replace(moves[1], turn=0.03), replace(moves[1], change=Change(0.01, 0.015))
+    turned = replace(moves[1], turn=0.03), replace(moves[1], change=StopChange(0.01, 0.015))
     for one in turned:
         with pytest.raises(DetentError, match="move 2: got a turn or a stop that is changed"):
             stage_legs("x", replace(job, moves=(one,)))

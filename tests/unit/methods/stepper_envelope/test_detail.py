@@ -10,7 +10,7 @@ from detent.methods.stepper_envelope import detail
 from detent.methods.stepper_envelope.detail import NEEDED_ROTOR, ShownMotion, telling, torque_charts
 from detent.methods.stepper_envelope.page import stage_page
 from detent.methods.stepper_envelope.run import MOTOR_SIGNALS
-from detent.methods.stepper_envelope.stage_job import Change, StageJog, StageMove
+from detent.methods.stepper_envelope.stage_job import StageJog, StageMove, StopChange
 from detent.methods.stepper_envelope.stage_trace import recorded_steps
 from detent.methods.stepper_envelope.summary import StageFigures
 from detent.page.draw import plain
@@ -118,7 +118,7 @@ def test_lost_steps_are_shown_first_and_such_a_rotor_comes_to_no_rest() -> None:
 
 
 def test_a_stop_that_was_passed_is_shown_with_its_turn() -> None:
-    late = StageMove(1, 1, targets={"group_a": 20 * MM}, change=Change(8 * MM, 8.2 * MM), label="late")
+    late = StageMove(1, 1, targets={"group_a": 20 * MM}, change=StopChange(8 * MM, 8.2 * MM), label="late")
     played = play("zoom.toml", moves(late, StageMove(2, 2, targets={"group_a": 0.0})))
     shown, page = shown_of(played), stage_page(*played)
     assert (shown.motion.move.number, shown.why) == (1, "the motion that had to pass its stop")

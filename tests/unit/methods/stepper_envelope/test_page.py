@@ -15,7 +15,7 @@ from detent.methods.stepper_envelope import stage_plan, stage_trace
 from detent.methods.stepper_envelope.comparison import compare_jerk
 from detent.methods.stepper_envelope.page import stage_page, target_of
 from detent.methods.stepper_envelope.run import MOTOR_SIGNALS
-from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageMove, load_stage_job
+from detent.methods.stepper_envelope.stage_job import StageJob, StageMove, StopChange, load_stage_job
 from detent.methods.stepper_envelope.stage_plan import tile_plan
 from detent.methods.stepper_envelope.stage_trace import NEEDED_STEPS, motor_runs, recorded_steps
 from detent.methods.stepper_envelope.summary import StageFigures
@@ -345,7 +345,7 @@ def test_what_is_wrong_is_marked_in_the_table_and_where_the_rotor_stands_after_i
 
 
 def test_a_stop_that_was_passed_is_a_warning() -> None:
-    late = StageMove(1, 1, targets={"group_a": 20 * MM}, change=Change(8 * MM, 8.2 * MM), label="late")
+    late = StageMove(1, 1, targets={"group_a": 20 * MM}, change=StopChange(8 * MM, 8.2 * MM), label="late")
     page = stage_page(*play("zoom.toml", moves(late)))
     assert page.headline.level == "warn"
     assert plain(page.headline.lead).startswith("Move 1: the stop of group_a was changed")

@@ -20,7 +20,7 @@ from detent.methods.stepper_envelope.derive import derive
 from detent.methods.stepper_envelope.envelope_files import Envelope, envelope_tables
 from detent.methods.stepper_envelope.page import stage_page
 from detent.methods.stepper_envelope.run import run_stage
-from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageJog, StageMove, load_stage_job
+from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove, StopChange, load_stage_job
 from detent.methods.stepper_envelope.stage_plan import tile_plan
 from detent.methods.stepper_envelope.summary import StageFigures, stage_summary_rows
 
@@ -108,7 +108,7 @@ def test_it_makes_the_same_moves(load_text):
     job = StageJob("moves", "moves", (
         StageMove(1, 1, targets={"dial": 1.5}),
         StageMove(2, 2, targets={"dial": 0.2}, turn=2.0),
-        StageMove(3, 3, by={"dial": 2.0}, change=Change(0.5, 1.0)),
+        StageMove(3, 3, by={"dial": 2.0}, change=StopChange(0.5, 1.0)),
         StageJog(4, 4, "dial", -3.0, 0.05),
     ), ("dial",))  # fmt: skip
     slides, turns = (run_stage(load_text(text_of(turns=turns)).spec, job) for turns in (False, True))
@@ -375,7 +375,7 @@ def test_the_unit_is_that_of_the_motor_that_the_move_names(write, row, key, does
 def test_what_the_axis_cannot_do_is_told_in_degrees(dial):
     far = StageJob("far", "moves", (
         StageMove(1, 1, targets={"dial": 4.0}), StageMove(2, 2, targets={"dial": 1.0}, turn=2.0),
-        StageMove(3, 3, targets={"dial": 0.1}, change=Change(2.0, 1.5)), StageJog(4, 4, "dial", 30.0, 1.0),
+        StageMove(3, 3, targets={"dial": 0.1}, change=StopChange(2.0, 1.5)), StageJog(4, 4, "dial", 30.0, 1.0),
     ), ("dial",))  # fmt: skip
     with pytest.raises(InputError) as caught:
         run_stage(dial, far)
@@ -408,7 +408,7 @@ def dials(tmp_path_factory) -> dict[bool, Played]:
     """The dial, and the same machine as one that slides."""
     job = StageJob("short.csv", "moves", (
         StageMove(1, 1, targets={"dial": 1.5}, label="A"), StageMove(2, 2, targets={"dial": 0.9}, turn=2.0),
-        StageJog(3, 3, "dial", 3.0, 0.05), StageMove(4, 4, targets={"dial": 2.5}, change=Change(1.9, 1.92)),
+        StageJog(3, 3, "dial", 3.0, 0.05), StageMove(4, 4, targets={"dial": 2.5}, change=StopChange(1.9, 1.92)),
     ), ("dial",))  # fmt: skip
     path = tmp_path_factory.mktemp("dial") / "dial.toml"
     made: dict[bool, Played] = {}

@@ -11,7 +11,7 @@ from detent.errors import STEP_FAULT_TEXT, AxisError, InputError
 from detent.methods.load import load_spec, read_axis
 from detent.methods.stepper_envelope.host import Leg, StageHost
 from detent.methods.stepper_envelope.run import run_stage, stage_signals
-from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageJog, StageMove
+from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove, StopChange
 
 pytestmark = pytest.mark.compiled
 
@@ -77,8 +77,8 @@ def test_a_turn_on_the_way_is_one_run(spec):
 
 def test_a_stop_changed_on_the_way(spec):
     moves = (
-        StageMove(1, 1, targets={"group_a": 4 * MM}, change=Change(1 * MM, 3 * MM)),
-        StageMove(2, 2, targets={"group_a": 0.0}, change=Change(2 * MM, 3.5 * MM)),
+        StageMove(1, 1, targets={"group_a": 4 * MM}, change=StopChange(1 * MM, 3 * MM)),
+        StageMove(2, 2, targets={"group_a": 0.0}, change=StopChange(2 * MM, 3.5 * MM)),
         StageMove(3, 3, targets={"group_a": 0.0}),
     )
     run = run_stage(spec, job(*moves))
@@ -92,7 +92,7 @@ def test_a_stop_changed_on_the_way(spec):
 @pytest.mark.parametrize(("at", "to"), [(0.5, 39), (1, 6)])  # on the way, and at its end
 def test_a_stop_moved_far_outwards_is_waited_for(spec, at, to):
     """The wait was timed by the way to the stop of before."""
-    run = run_stage(spec, job(StageMove(1, 1, targets={"group_a": 1 * MM}, change=Change(at * MM, to * MM))))
+    run = run_stage(spec, job(StageMove(1, 1, targets={"group_a": 1 * MM}, change=StopChange(at * MM, to * MM))))
     assert run.done, run.failure
     motor = run.moves[0].motors["group_a"]
     assert (motor.stop, motor.steps, motor.overrun) == (pytest.approx(to * MM), to * 200, False)
@@ -118,7 +118,7 @@ def test_a_reversal_is_waited_for_however_long_its_pause(spec):
 AFTER_A_JOG = {
     "outside the travel": (StageMove(2, 2, by={"group_a": -10.7 * MM}), ["-10.17 mm", "from 0 m to 40 mm"]),
     "turn short of the target": (StageMove(2, 2, targets={"group_a": 20 * MM}, turn=15 * MM), ["turn", "15 mm"]),
-    "not passed": (StageMove(2, 2, targets={"group_a": 9 * MM}, change=Change(0.1 * MM, 20 * MM)), ["changed_at"]),
+    "not passed": (StageMove(2, 2, targets={"group_a": 9 * MM}, change=StopChange(0.1 * MM, 20 * MM)), ["changed_at"]),
 }
 
 
@@ -136,7 +136,7 @@ def test_a_way_after_a_jog_that_stays_inside_is_made_also_with_turn_and_change(s
     moves = (
         StageJog(1, 1, "group_a", 5 * MM, 0.1),
         StageMove(2, 2, targets={"group_a": 3 * MM}, turn=4 * MM),
-        StageMove(3, 3, by={"group_a": -2 * MM}, change=Change(2 * MM, 0.0)),
+        StageMove(3, 3, by={"group_a": -2 * MM}, change=StopChange(2 * MM, 0.0)),
     )
     run = run_stage(spec, job(*moves))
     assert run.done, run.failure
@@ -242,9 +242,9 @@ def test_a_fault_of_the_rule_ends_the_job(spec):
         (StageMove(1, 7, targets={"group_a": 20 * MM}, turn=15 * MM), ["turn", "15 mm", "beyond"]),
         (StageMove(1, 7, targets={"group_a": 20 * MM}, turn=20 * MM), ["turn", "beyond"]),
         (StageMove(1, 7, targets={"group_a": 20 * MM}, turn=0.0), ["turn", "beyond"]),
-        (StageMove(1, 7, targets={"group_a": 1 * MM}, change=Change(2 * MM, 3 * MM)), ["changed_at", "2 mm"]),
-        (StageMove(1, 7, targets={"group_a": 1 * MM}, change=Change(0.0, 3 * MM)), ["changed_at", "0 m"]),
-        (StageMove(1, 7, targets={"group_a": 1 * MM}, change=Change(0.5 * MM, 50 * MM)), ["50 mm"]),
+        (StageMove(1, 7, targets={"group_a": 1 * MM}, change=StopChange(2 * MM, 3 * MM)), ["changed_at", "2 mm"]),
+        (StageMove(1, 7, targets={"group_a": 1 * MM}, change=StopChange(0.0, 3 * MM)), ["changed_at", "0 m"]),
+        (StageMove(1, 7, targets={"group_a": 1 * MM}, change=StopChange(0.5 * MM, 50 * MM)), ["50 mm"]),
         (StageMove(1, 7, targets={"z": 1 * MM}), ["the motor z", "group_a, group_b"]),
         (StageJog(1, 7, "group_a", 30 * MM, 1.0), ["speed", "30 mm/s", "write 20 mm/s"]),
         (StageJog(1, 7, "group_a", 1e-9, 1.0), ["speed", "to 20 mm/s"]),

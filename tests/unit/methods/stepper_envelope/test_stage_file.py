@@ -9,7 +9,7 @@ from tests.places import DATA
 from detent.errors import MOST_PROBLEMS, InputError
 from detent.files.text import MAX_BYTES
 from detent.methods.moves.job import MOST_MOVES
-from detent.methods.stepper_envelope.stage_job import Change, StageJog, load_stage_job
+from detent.methods.stepper_envelope.stage_job import StageJog, StopChange, load_stage_job
 
 EXAMPLES = files("detent") / "examples"
 SLIDES = DATA / "workloads/stage_tiles_czi"
@@ -219,7 +219,7 @@ def test_toml_keeps_moves_and_manual_runs_in_order(write):
     assert jog == StageJog(2, 10, "y", -0.0127, 0.5)
     assert (both.targets, both.by) == (again.targets, again.by) == ({"x": 0.0}, {"y": 0.001})
     assert (turning.by, turning.turn, turning.change) == ({"x": -0.001}, 0.004, None)
-    assert (changed.targets, changed.change) == ({"x": 0.003}, Change(at=0.001, to=0.002))
+    assert (changed.targets, changed.change) == ({"x": 0.003}, StopChange(at=0.001, to=0.002))
 
 
 def test_toml_as_programs_write_it(write):

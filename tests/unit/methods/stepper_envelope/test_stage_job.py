@@ -7,7 +7,7 @@ import pytest
 
 from detent.errors import DetentError
 from detent.methods.moves.job import MOST_MOVES, expand_moves
-from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageJog, StageMove
+from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove, StopChange
 
 
 def test_a_move_names_motors_by_places_and_by_ways_and_the_others_stay():
@@ -27,7 +27,7 @@ def test_moves_do_not_share_their_motors():
 
 def test_a_move_of_one_motor_may_turn_or_have_its_stop_changed():
     assert StageMove(1, 1, {"x": 0.01}, turn=0.03).turn == 0.03
-    assert StageMove(1, 1, by={"x": 0.01}, change=Change(0.005, 0.02)).change == Change(at=0.005, to=0.02)
+    assert StageMove(1, 1, by={"x": 0.01}, change=StopChange(0.005, 0.02)).change == StopChange(at=0.005, to=0.02)
 
 
 @pytest.mark.parametrize(
@@ -40,19 +40,19 @@ def test_a_move_of_one_motor_may_turn_or_have_its_stop_changed():
         ({"by": {"x": 0.1}, "dwell": -0.5}, "dwell -0.5 s", "a time from 0 s"),
         ({"by": {"x": 0.1}, "dwell": math.nan}, "dwell nan s", "a time from 0 s"),
         ({"by": {"x": 0.1}, "turn": math.inf}, "turn inf m", "a length"),
-        ({"by": {"x": 0.1}, "change": Change(math.nan, 0)}, "changed_at nan m", "a length"),
-        ({"by": {"x": 0.1}, "change": Change(0, math.inf)}, "changed_to inf m", "a length"),
+        ({"by": {"x": 0.1}, "change": StopChange(math.nan, 0)}, "changed_at nan m", "a length"),
+        ({"by": {"x": 0.1}, "change": StopChange(0, math.inf)}, "changed_to inf m", "a length"),
         (
             {"by": {"x": 0.1, "y": 0.1}, "turn": 0.2},
             "turn in a move of 2 motors",
             "turn in a move of exactly one motor",
         ),
         (
-            {"targets": {"x": 0.1}, "by": {"y": 0.1}, "change": Change(0, 0)},
+            {"targets": {"x": 0.1}, "by": {"y": 0.1}, "change": StopChange(0, 0)},
             "changed_at in a move of 2 motors",
             "changed_at in a move",
         ),
-        ({"by": {"x": 0.1}, "turn": 0.2, "change": Change(0, 0)}, "turn and changed_at", "one of them"),
+        ({"by": {"x": 0.1}, "turn": 0.2, "change": StopChange(0, 0)}, "turn and changed_at", "one of them"),
     ],
 )
 def test_no_move_is_what_no_stage_can_do(values, got, allowed):
