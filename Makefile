@@ -98,13 +98,18 @@ WHOLE    := $(addprefix tests/unit/,methods identify cli export tune)
 PANEL    := _49_ or _50_ or _51_ or _52_ or _53_
 SEEN     := not long and not wide and not bench and not process
 COVER    := $(BIN)/python -m coverage run -m pytest $(PYTEST_ARGS)
+# The faces are processes of their own, which are measured with their clients' tests.
+FACES    := $(BIN)/python -m coverage run --rcfile=$(CURDIR)/tests/faces.coveragerc -m pytest $(PYTEST_ARGS) \
+            -m "not long and not wide" tests/acceptance/test_faces.py
 coverage: venv-test ## which lines and branches the unit tests reach
-	COVERAGE_FILE=.coverage.whole $(COVER) -m "$(SEEN)" $(WHOLE) & whole=$$!; \
+	rm -f .coverage.faces.*
+	(COVERAGE_FILE=.coverage.whole $(COVER) -m "$(SEEN)" $(WHOLE) && \
+	    COVERAGE_FILE=$(CURDIR)/.coverage.faces $(FACES)) & whole=$$!; \
 	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.steps $(COVER) -m "$(SEEN) and not compiled" $(STEPS); steps=$$?; \
 	COVERAGE_FILE=.coverage.rest $(COVER) -m "$(SEEN)" tests/unit $(addprefix --ignore=,$(WHOLE) $(BLOCKS)); rest=$$?; \
 	COVERAGE_FILE=.coverage.panel $(COVER) -m "$(SEEN)" -k "$(PANEL)" tests/acceptance/test_live.py; panel=$$?; \
 	wait $$whole && test $$steps = 0 && test $$rest = 0 && test $$panel = 0
-	$(BIN)/python -m coverage combine .coverage.whole .coverage.steps .coverage.rest .coverage.panel
+	$(BIN)/python -m coverage combine .coverage.whole .coverage.steps .coverage.rest .coverage.panel .coverage.faces.*
 	$(BIN)/python -m coverage report
 
 lint: venv-dev ## ruff: rules and layout
