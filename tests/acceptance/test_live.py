@@ -853,8 +853,9 @@ def test_12_invariants_hold_in_a_thousand_sequences(part, steps):
     run_machine(AxisMachine, part, 50, steps)
 
 
-@pytest.mark.wide
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize(
+    "part", [pytest.param(part, marks=pytest.mark.wide if part < 2 else pytest.mark.long) for part in range(4)]
+)
 def test_12_no_pulse_is_lost_whatever_is_asked(part):
     run_machine(PulseMachine, part, 50, 100)
 
