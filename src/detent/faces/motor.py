@@ -147,7 +147,9 @@ class Motor:
         if field != "STOP":
             await self._free.wait()  # a put behind a stop comes behind its end, which would cut what it begins
             if field in MOTIONS and stops != self._stops:
-                return  # another stop has come meanwhile
+                await self.change({"DMOV": 0})  # another stop has come meanwhile: a motion that ended at once, so that
+                await self.change({"DMOV": 1})  # nobody waits for it
+                return
         await self.actions[field](value)
 
     async def _keep(self, field: str, value: Any) -> None:
