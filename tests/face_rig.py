@@ -127,7 +127,7 @@ def drive_on_virtual(live: Faced, channel: str, *, commands: bool = True) -> Ite
     loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
-    desk = Desk(Path(live.started["channel"]), "canopen", commands)
+    desk = Desk({"": Path(live.started["channel"])}, "canopen", commands)
     network = canopen.Network()
     network.connect(interface="virtual", channel=channel)
     try:

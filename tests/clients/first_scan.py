@@ -7,7 +7,7 @@ from bluesky import RunEngine
 from bluesky.plans import scan
 from ophyd import EpicsMotor
 
-motor = EpicsMotor(sys.argv[1], name="motor")
+motor = EpicsMotor(sys.argv[1], name="motor", settle_time=0.1)  # ophyd 1.11 loses a move that follows at once
 motor.wait_for_connection(timeout=10)
 
 events = []

@@ -14,8 +14,8 @@ from ophyd import EpicsMotor, EpicsSignal, EpicsSignalRO  # noqa: E402
 
 faulthandler.dump_traceback_later(45)
 name, _, what = sys.argv[1:4]
-# ophyd 1.11 puts the status of a move away after it has told its end; a move that another thread begins in between, on a
-# busy machine, is put away with it, and never ends. Time to settle lies between them.
+# ophyd 1.11 puts the status of a move away after it has told its end; a move that another thread begins in between, on
+# a busy machine, is put away with it, and never ends. Time to settle lies between them.
 motor = EpicsMotor(name, name="motor", settle_time=0.1 if what == "scans" else 0.0)
 begin = time.monotonic()
 motor.wait_for_connection(timeout=10)

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from detent.cli.app import DONE, NOT_DONE, Json, Set, app, option
-from detent.cli.terminal import compiling_counted, print_json, tell
+from detent.cli.terminal import print_json, tell
 from detent.errors import DetentError
 from detent.units import format_quantity
 
@@ -53,7 +53,9 @@ WORD = (
 def live(
     file: File,
     overrides: Set = None,
-    motor: Annotated[str, option("--motor", "NAME", "Which motor, of a file with several.")] = "",
+    motor: Annotated[
+        str, option("--motor", "NAME", "Which motor, of a file with several; else all of them, each an axis.")
+    ] = "",
     speed: Annotated[float, option("--speed", "", SPEED)] = 1.0,
     period: Annotated[str, option("--period", "", PERIOD)] = "1 ms",
     drive: Annotated[str, option("--drive", "NAME:ADDRESS", DRIVE)] = "sim",
@@ -85,68 +87,57 @@ def live(
     as_json: Json = False,
 ) -> None:
     """Run an axis live, in wall time, until Ctrl-C: it then comes to rest in a ramp and lets go."""
+    from detent.cli.running import Running, end_all, places
     from detent.faces.child import Faces
-    from detent.operate.client import LiveAxis
     from detent.operate.realtime import going_first
-    from detent.operate.session import Session
-    from detent.operate.start import Place, beside, make_host, shared_memory
-    from detent.operate.watchdog import Watchdog
-    from detent.panel.child import Child, PanelPlace
+    from detent.operate.start import beside
+    from detent.panel.child import PanelPlace
 
     at = PanelPlace(bind, port, certificate, key_file, plain, names or ())
     at.check()
     asked = {"epics": epics, "pva": pva, "canopen": canopen, "modbus": modbus, "scpi": scpi, "grbl": grbl, "gcs": gcs,
              "zaber": zaber, "alpaca": alpaca}  # fmt: skip
     wanted, may_command = _faces(file, overrides or [], asked, commands=commands)
+    motors = _motors(file, overrides or [], motor, {"--store": store, "--record": record, "--drive": drive != "sim"})
+    kept = None if no_store else store or beside(file)
+    chosen = {"overrides": overrides or [], "speed": speed, "period": _seconds(period), "store": kept, "drive": drive}
     with ExitStack() as closing:
         closing.enter_context(going_first())
-        place, where, (board, memory) = Place(file), None if no_store else store or beside(file), shared_memory()
-        closing.callback(place.leave)
-        with compiling_counted(quiet=as_json):
-            host, name = make_host(
-                file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where, memory=memory,
-                drive=drive,
-            )  # fmt: skip
-            if record:
-                closing.callback(_record(host, record).close)
-            missing, left = host.start(), Ending()
-        closing.callback(lambda: host.is_running and host.close())  # where what follows cannot begin
-        watchdog = closing.enter_context(contextlib.closing(Watchdog(host.board, board)))
-        about = {"name": name, "file": str(file), "simulated": host.link is None, "speed": speed}
-        session = Session(host, about, _axis_file(file, overrides or []))
-        channel = _serve(closing, place, session)
+        read, left = _axis_file(file, overrides or []), Ending()
+        axes = [Running(closing, file, one, chosen, read, record=record, quiet=as_json) for one in motors]
         left.hear()
-        panel = None if headless else closing.enter_context(contextlib.closing(Child(channel.path, at)))
-        faces = closing.enter_context(contextlib.closing(Faces(channel.path, wanted, commands=may_command)))
-        links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
-        more = {"channel": str(channel.path), "not_permitted": missing, "panel": links, "watchdog": watchdog.id}
-        more |= {"faces": faces.places, "commands": may_command, "face_processes": faces.processes}
-        _tell_start(file, _started(session) | more, as_json=as_json)
-        while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
-            _mend(panel, watchdog, faces, quiet=as_json)
-        status = NOT_DONE if not host.is_alive else DONE
-        LiveAxis(session).close()
-        host.note()  # the pulls of its end belong to the log
-    _tell_end(session, as_json=as_json)
+        for one, where in () if headless else zip(axes, places(at, axes), strict=True):
+            one.show(closing, where)
+        channels = {one.motor: one.channel.path for one in axes}
+        faces = closing.enter_context(contextlib.closing(Faces(channels, wanted, commands=may_command)))
+        roles = ("engineer", "viewer")[: 1 + viewer_link]
+        more = {"faces": faces.places, "commands": may_command, "face_processes": faces.processes}
+        _tell_start(file, {one.motor: one.started(roles) for one in axes}, more, as_json=as_json)
+        while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and _live(axes):
+            told = [text for one in (*axes, faces) for text in one.mend()]
+            for text in filter(None, () if as_json else told):
+                tell(text)
+        status = DONE if _live(axes) else NOT_DONE
+        _tell_end(end_all(axes), {one.motor: one.session.unit for one in axes}, as_json=as_json)
     raise typer.Exit(status)
 
 
-def _serve(closing: ExitStack, place: Any, session: Any) -> Any:
-    """Let other programs ask; what they ask is written down beside the store, or the channel. Gives the channel."""
-    from detent.operate.audit import Audit
-
-    store = session.status()["store"]
-    path = Path(store["path"]) if store else place.channel
-    audit = closing.enter_context(contextlib.closing(Audit(path.with_suffix(".audit"))))
-    return closing.enter_context(contextlib.closing(place.serve(session, audit)))
+def _live(axes: Any) -> bool:
+    """True while all loops run: where one has ended, the others are brought to rest with it."""
+    return all(one.host.is_alive for one in axes)
 
 
-def _started(session: Any) -> dict[str, Any]:
-    """How it is at the beginning."""
-    status, told, link = session.status(), session.describe(), session.host.link
-    found = {key: told[key] for key in ("name", "file", "simulated", "speed", "unit", "period", "drive")}
-    found |= {key: status[key] for key in ("state", "store", "position", "trust", "find")}
-    return found | {"hardware": link.driver.hardware if link else ""}
+def _motors(file: Path, overrides: list[str], motor: str, single: dict[str, object]) -> list[str]:
+    """Motors that run; options that are for one of them are refused for several."""
+    from detent.methods.load import read_axis
+    from detent.operate.start import motors_of
+
+    motors = motors_of(read_axis(file, overrides), motor)
+    wrong = [name for name, value in single.items() if value]
+    if len(motors) > 1 and wrong:
+        got = f"{wrong[0]}: got {file} with the motors {', '.join(motors)}"
+        raise DetentError(f"{got}; expected: one of them; name it, as --motor {motors[0]}")
+    return motors
 
 
 def _faces(file: Path, overrides: list[str], asked: dict[str, str], *, commands: bool) -> tuple[dict[str, str], bool]:
@@ -156,15 +147,6 @@ def _faces(file: Path, overrides: list[str], asked: dict[str, str], *, commands:
     table = load_spec(file, overrides).faces
     stated = table.wanted if table else {}
     return stated | {face: one for face, one in asked.items() if one}, commands or bool(table and table.commands)
-
-
-def _mend(panel: Any, watchdog: Any, faces: Any, *, quiet: bool) -> None:
-    """Start again what has died beside the loop."""
-    told = [panel.mend()] if panel else []
-    told += list[str](faces.mend())
-    told += ["The watchdog had ended; another one watches now."] if watchdog.keep() else []
-    for one in filter(None, () if quiet else told):
-        tell(one)
 
 
 class Ending:
@@ -189,26 +171,17 @@ class Ending:
         return bool(select.select([self._hears], [], [], seconds)[0])
 
 
-def _tell_end(session: Any, *, as_json: bool) -> None:
-    """Where it stands, and how the loop did."""
-    status = session.status()
+def _tell_end(ends: dict[str, dict[str, Any]], units: dict[str, str], *, as_json: bool) -> None:
+    """Where each stands, and how its loop did."""
     if as_json:
-        print_json({"ended": status})
+        print_json({"ended": ends if len(ends) > 1 else next(iter(ends.values()))})
         return
-    tell(f"At rest at {status['position']:.6g} {session.unit}, torque off; {status['loop']['periods']} periods, "
-         f"{status['loop']['skipped']} skipped, latest {status['loop']['worst'] * 1e6:.0f} us.")  # fmt: skip
-    if status["store"]:
-        tell(f"Where it stands is kept in {status['store']['path']}")
-
-
-def _record(host: Any, path: Path) -> Any:
-    """Let a new file take the log of a host."""
-    from detent.operate.audit import Appender
-
-    path.open("x", encoding="utf-8").close()
-    recorder = Appender(path)
-    host.log.sink = recorder.add
-    return recorder
+    for motor, status in ends.items():
+        tell(f"{f'{motor}: at' if motor else 'At'} rest at {status['position']:.6g} {units[motor]}, torque off; "
+             f"{status['loop']['periods']} periods, {status['loop']['skipped']} skipped, latest "
+             f"{status['loop']['worst'] * 1e6:.0f} us.")  # fmt: skip
+        if status["store"]:
+            tell(f"Where it stands is kept in {status['store']['path']}")
 
 
 def _axis_file(file: Path, overrides: list[str]) -> dict[str, Any]:
@@ -231,26 +204,33 @@ def _seconds(period: str) -> float:
         raise DetentError(f"--period {period}: {error}") from error
 
 
-def _tell_start(file: Path, started: dict[str, Any], *, as_json: bool) -> None:
+def _tell_start(file: Path, axes: dict[str, dict[str, Any]], more: dict[str, Any], *, as_json: bool) -> None:
     """What is running, and how to speak to it."""
     if as_json:
-        print(json.dumps(started), flush=True)
+        print(json.dumps(({"axes": axes} if len(axes) > 1 else next(iter(axes.values()))) | more), flush=True)
         return
-    name = shlex.quote(str(file))
+    for motor, started in axes.items():
+        _tell_axis(shlex.quote(str(file)), f" --motor {motor}" if motor else "", started)
+    _tell_faces(more)
+    tell(f"Ctrl-C stops {'all axes' if len(axes) > 1 else 'the axis'}, then ends.")
+    sys.stdout.flush()
+
+
+def _tell_axis(name: str, motor: str, started: dict[str, Any]) -> None:
+    """Of one axis."""
     speed = "" if started["speed"] == 1.0 else f", time {started['speed']:g} times as fast"
     what = "SIMULATION" if started["simulated"] else f"on {started['hardware']}"
     tell(f"{started['name']}: live, {what}{speed}; every {started['period'] * 1e3:g} ms; {started['state']}.")
     for fact in started["drive"]:
         tell(f"  {fact}")
     for link, role in zip(started["panel"], ("", ", to look only"), strict=False):
-        tell(f"Panel{role}: {link} (works once, within ten minutes; another: detent connect {name} link)")
-    tell(f'From a second terminal: detent connect {name} enable, then detent connect {name} move_by "5 mm"')
-    _tell_faces(started)
+        tell(f"Panel{role}: {link} (works once, within ten minutes; another: detent connect {name}{motor} link)")
+    tell(
+        f'From a second terminal: detent connect {name}{motor} enable, then detent connect {name}{motor} move_by "5 mm"'
+    )
     for one in started["not_permitted"]:
         tell(f"Not permitted: {one}")
-    _tell_store(name, started)
-    tell("Ctrl-C stops the axis, then ends.")
-    sys.stdout.flush()
+    _tell_store(name + motor, started)
 
 
 def _tell_faces(started: dict[str, Any]) -> None:
@@ -282,22 +262,23 @@ def connect(
     word: Annotated[str, typer.Argument(help=WORD)] = "status",
     value: Annotated[str | None, typer.Argument(help='Where to, how far, how fast: "120 mm", 3, "20 mm/s".')] = None,
     second: Annotated[str | None, typer.Argument(help='Of edit the place, "5 mm"; of rename the new name.')] = None,
+    motor: Annotated[str, option("--motor", "NAME", "Which motor, of a file with several that run.")] = "",
     speed: Annotated[float, option("--speed", "", "Share of the largest speed, above 0 to 1.")] = 1.0,
     seconds: Annotated[float, option("--for", "SECONDS", "How long a jog lasts.", min=0.0)] = 1.0,
     *,
     as_json: Json = False,
 ) -> None:
     """Ask an axis that runs live for something, and wait until that has ended."""
-    from detent.operate.channel import channel_of
+    from detent.operate.channel import running_channel
     from detent.operate.faults import describe_fault
     from detent.operate.start import connect as connect_to
     from detent.operate.words import PLACES, describe_status
     from detent.panel.keys import keys_of, link_of
 
     if word == "link":
-        tell(link_of(keys_of(channel_of(file)), value or "engineer", time.time()))
+        tell(link_of(keys_of(running_channel(file, motor)), value or "engineer", time.time()))
         return
-    with connect_to(file) as axis:
+    with connect_to(file, motor) as axis:
         ended: dict[str, Any] = {}
         if word == "jog":
             if value is None:

@@ -15,7 +15,8 @@ from detent.faces.service import Desk
 
 async def run(told: dict[str, Any]) -> None:
     """Serve until told to end, or until the axis has gone."""
-    desk = Desk(Path(told["channel"]), told["face"], told["commands"])
+    channels = {motor: Path(channel) for motor, channel in told["channels"].items()}
+    desk = Desk(channels, told["face"], told["commands"])
     try:
         serve = import_module(f"detent.faces.{FACES[told['face']].module}").serve
         places = await serve(desk, told["address"])

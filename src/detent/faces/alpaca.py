@@ -228,16 +228,21 @@ def flag_of(said: dict[str, str], name: str) -> bool:
 
 
 class Alpaca:
-    """Routes of one device."""
+    """Routes of devices, which are numbered by their kind."""
 
-    def __init__(self, device: Device) -> None:
-        self.device, self._numbers = device, count(1)
+    def __init__(self, devices: list[Device]) -> None:
+        kinds = [device.kind for device in devices]
+        self.devices = {
+            (kind, kinds[:k].count(kind)): one for k, (kind, one) in enumerate(zip(kinds, devices, strict=True))
+        }
+        self._numbers = count(1)
 
     async def ask(self, request: Request) -> Response:
-        """A request about the device."""
-        if request.path_params["kind"] != self.device.kind or request.path_params["number"] != 0:
+        """A request about a device."""
+        path = request.path_params
+        name, device = path["name"], self.devices.get((path["kind"], path["number"]))
+        if device is None:
             return PlainTextResponse("no such device", 400)
-        name, device = request.path_params["name"], self.device
         text = request.url.query if request.method == "GET" else (await request.body()).decode("latin-1")
         said = dict(parse_qsl(text, keep_blank_values=True))
         known: Any = (device.gets if request.method == "GET" else device.puts).get(name)
@@ -273,17 +278,20 @@ class Alpaca:
 
     async def manage(self, request: Request) -> Response:
         """The management API."""
-        name = self.device.axis.about["name"]
+        names = [device.axis.about["name"] for device in self.devices.values()]
         values: dict[str, object] = {
             "apiversions": [1],
             "v1/description": {
-                "ServerName": f"detent: {name}", "Manufacturer": "detent", "ManufacturerVersion": version("detent"),
-                "Location": "",
+                "ServerName": f"detent: {', '.join(names)}", "Manufacturer": "detent",
+                "ManufacturerVersion": version("detent"), "Location": "",
             },
-            "v1/configureddevices": [{
-                "DeviceName": name, "DeviceType": self.device.kind.capitalize(), "DeviceNumber": 0,
-                "UniqueID": f"detent-{self.device.kind}-{name}",
-            }],
+            "v1/configureddevices": [
+                {
+                    "DeviceName": name, "DeviceType": kind.capitalize(), "DeviceNumber": number,
+                    "UniqueID": f"detent-{kind}-{name}",
+                }
+                for (kind, number), name in zip(self.devices, names, strict=True)
+            ],
         }  # fmt: skip
         value = values.get(request.path_params["what"])
         if value is None:
@@ -319,8 +327,7 @@ class Discovery(asyncio.DatagramProtocol):
 async def serve(desk: Desk, address: str) -> list[str]:
     """Serve; gives what a client needs."""
     host, number = address_of(desk.face, address, PORT)
-    axis = await desk.open()
-    alpaca = Alpaca((Rotator if axis.about["unit"] == "rad" else Focuser)(axis))
+    alpaca = Alpaca([(Rotator if axis.about["unit"] == "rad" else Focuser)(axis) for axis in await desk.open()])
     config = uvicorn.Config(
         alpaca.app(), host=host, port=number, log_level="warning", access_log=False, server_header=False,
         lifespan="off", timeout_graceful_shutdown=1,
@@ -330,7 +337,10 @@ async def serve(desk: Desk, address: str) -> list[str]:
     server = uvicorn.Server(config)
     server.install_signal_handlers = lambda: None  # type: ignore[attr-defined]
     desk.keep(asyncio.ensure_future(server.serve(sockets=[listening])))
-    loop, told = asyncio.get_running_loop(), [f"{host}:{port}", f"{alpaca.device.kind} 0"]
+    loop, told = (
+        asyncio.get_running_loop(),
+        [f"{host}:{port}", *(f"{kind} {number}" for kind, number in alpaca.devices)],
+    )
     try:
         await loop.create_datagram_endpoint(lambda: Discovery(port), local_addr=(host, DISCOVERY), reuse_port=True)
     except OSError as error:

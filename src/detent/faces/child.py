@@ -33,10 +33,10 @@ FACES = {
 
 
 class Faces:
-    """The processes of the faces that were asked for, each with its address."""
+    """The processes of the faces that were asked for, each with its address; `channels` by motor, "" a single one."""
 
-    def __init__(self, channel: Path, wanted: Mapping[str, str], *, commands: bool) -> None:
-        self._channel, self._commands = channel, commands
+    def __init__(self, channels: Mapping[str, Path], wanted: Mapping[str, str], *, commands: bool) -> None:
+        self._channels, self._commands = {motor: str(channel) for motor, channel in channels.items()}, commands
         self._processes: dict[str, Any] = {}
         self._addresses = dict(wanted)
         self.places: dict[str, Sequence[str]] = {}
@@ -49,7 +49,7 @@ class Faces:
 
     def _start(self, face: str) -> None:
         told = {
-            "face": face, "channel": str(self._channel), "address": self._addresses[face], "commands": self._commands,
+            "face": face, "channels": self._channels, "address": self._addresses[face], "commands": self._commands,
         }  # fmt: skip
         # A group of its own: Ctrl-C at the terminal must not close it before the axis is at rest.
         process = subprocess.Popen(

@@ -114,16 +114,18 @@ async def serve(desk: Desk, address: str) -> list[str]:
         "EPICS_CA_SERVER_PORT": str(port), "EPICS_CAS_SERVER_PORT": str(port), "EPICS_CAS_INTF_ADDR_LIST": host,
         "EPICS_CAS_AUTO_BEACON_ADDR_LIST": "NO", "EPICS_CAS_BEACON_ADDR_LIST": host,
     }  # fmt: skip
-    axis = await desk.open()
-    served = Served(name)
-    motor = Motor(axis, served.show)
-    served.attach(motor)
-    await served.begin(motor)
-    context = Context(served.group.pvdb, [host])
-    for work in (context.run(), motor.follow(), served.follow(motor)):
-        desk.keep(asyncio.ensure_future(work))
+    names, pvs = list[str](), dict[str, Any]()
+    for axis in await desk.open():
+        names.append(f"{name}:{axis.motor}" if axis.motor else name)
+        served = Served(names[-1])
+        motor = Motor(axis, served.show)
+        served.attach(motor)
+        await served.begin(motor)
+        pvs |= served.group.pvdb
+        for work in (motor.follow(), served.follow(motor)):
+            desk.keep(asyncio.ensure_future(work))
+    context = Context(pvs, [host])
+    desk.keep(asyncio.ensure_future(context.run()))
     while not context.port:  # noqa: ASYNC110 - caproto tells it nobody
         await asyncio.sleep(0.01)
-    return [
-        name, f"EPICS_CA_ADDR_LIST={host} EPICS_CA_AUTO_ADDR_LIST=NO EPICS_CA_SERVER_PORT={port}",
-    ]  # fmt: skip
+    return [*names, f"EPICS_CA_ADDR_LIST={host} EPICS_CA_AUTO_ADDR_LIST=NO EPICS_CA_SERVER_PORT={port}"]

@@ -1,7 +1,7 @@
-"""GCS 2.0 as PI's controllers speak it: the part of it that moves one axis, called "1"."""
+"""GCS 2.0 as PI's controllers speak it: the part of it that moves axes, called "1" and, of several motors, so on."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -10,7 +10,6 @@ from detent.faces.service import BEYOND, READ_ONLY, UNREFERENCED, AxisService, D
 from detent.faces.talk import Send, Talk, serve_lines
 
 PORT = 50000
-AXIS = "1"
 SYNTAX, UNKNOWN, UNMOVABLE, OUTSIDE, TOO_FAST, STOPPED, NO_AXIS, RANGE, PROTECTED = 1, 2, 5, 7, 8, 10, 15, 17, 63
 """Numbers of errors, as PI's manuals have them."""
 MOTION, READY, STATUS, HALT = 5, 7, 4, 24  # characters that stand for themselves
@@ -28,10 +27,12 @@ class GcsError(Exception):
 class Gcs(Talk):
     """One client."""
 
-    def __init__(self, axis: AxisService, send: Send) -> None:
-        super().__init__(axis, send)
-        self.number, self.speed = 0, axis.speed
-        self._begun: asyncio.Future[None] | None = None
+    def __init__(self, axes: tuple[AxisService, ...], send: Send) -> None:
+        super().__init__(axes, send)
+        self.number = 0
+        self.named = {str(k): axis for k, axis in enumerate(axes, 1)}
+        self.speeds = {name: axis.speed for name, axis in self.named.items()}
+        self._begun: dict[str, asyncio.Future[None]] = {}
 
     def stops(self, line: str) -> bool:
         """STP and HLT overtake."""
@@ -40,11 +41,11 @@ class Gcs(Talk):
     def urgent(self, byte: int) -> bool:
         """Single characters: is it moving, is it ready, its status, stop."""
         if byte == MOTION:
-            self.send(format(int(self._moves()), "x"))
+            self.send(format(sum(self._moves(name) << k for k, name in enumerate(self.named)), "x"))
         elif byte == READY:
             self._send(b"\xb1\n")
         elif byte == STATUS:
-            self.send(f"0x{self.status_word():x}")
+            self.send(" ".join(f"0x{self.status_word(name):x}" for name in self.named))
         elif byte == HALT:
             task = asyncio.ensure_future(self.answer("STP"))
             self._stopping = task
@@ -52,15 +53,15 @@ class Gcs(Talk):
             return False
         return True
 
-    def _moves(self) -> bool:
-        return self.axis.moving or (self._begun is not None and not self._begun.done())
+    def _moves(self, name: str) -> bool:
+        return self.named[name].moving or (name in self._begun and not self._begun[name].done())
 
-    def status_word(self) -> int:
+    def status_word(self, name: str) -> int:
         """As the table of SRG? and #4 has it: limits, reference, error, servo, moving, on target."""
-        axis = self.axis
+        axis = self.named[name]
         bits = {
             0x0001: axis.at_end == "lower", 0x0004: axis.at_end == "upper", 0x0100: axis.fault != 0,
-            0x1000: axis.enabled, 0x2000: self._moves(), 0x8000: bool(axis.status["in_window"]),
+            0x1000: axis.enabled, 0x2000: self._moves(name), 0x8000: bool(axis.status["in_window"]),
         }  # fmt: skip
         return sum(bit for bit, is_set in bits.items() if is_set)
 
@@ -71,7 +72,7 @@ class Gcs(Talk):
             handler = HANDLERS.get(word.upper())
             if handler is None:
                 raise GcsError(UNKNOWN)  # noqa: TRY301 - one place that keeps the number
-            await self.axis.refresh()
+            await asyncio.gather(*(axis.refresh() for axis in self.axes))
             told = await handler(self, values)
         except GcsError as error:
             self.number = error.code
@@ -86,33 +87,40 @@ class Gcs(Talk):
 
     # ---- what handlers share
 
-    def pairs(self, values: list[str]) -> float:
-        """The value that is given for the axis."""
-        if len(values) != 2:
+    def pairs(self, values: list[str]) -> list[tuple[str, float]]:
+        """Axes with the value that is given for each."""
+        if not values or len(values) % 2:
             raise GcsError(SYNTAX)
-        self.only(values[:1])
-        return float(values[1])
+        return list(zip(self.asked(values[::2]), map(float, values[1::2]), strict=True))
 
-    def only(self, values: list[str]) -> None:
-        """The axis, or nothing, which means all of them."""
-        if any(value != AXIS for value in values):
+    def asked(self, values: list[str]) -> list[str]:
+        """Axes that are named, or none, which means all of them."""
+        if any(value not in self.named for value in values):
             raise GcsError(NO_AXIS)
+        return values or list(self.named)
 
-    def shown(self, values: list[str], value: object) -> str:
-        """What is answered of the axis."""
-        self.only(values)
-        return f"{AXIS}={value:.7f}" if isinstance(value, float) else f"{AXIS}={value}"
-
-    async def begin(self, word: str, value: float | None = None) -> None:
+    async def begin(self, name: str, word: str, value: float | None = None) -> None:
         """Begin a motion: GCS waits for none."""
-        if not self.axis.enabled:
+        axis = self.named[name]
+        if not axis.enabled:
             raise GcsError(UNMOVABLE)
-        ending = await self.axis.start(word, value, self.axis.share(self.speed))
-        self._begun = asyncio.ensure_future(self._end(word, ending))
+        ending = await axis.start(word, value, axis.share(self.speeds[name]))
+        self._begun[name] = asyncio.ensure_future(self._end(axis, word, ending))
 
-    async def _end(self, word: str, ending: "asyncio.Future[dict[str, Any]]") -> None:
+    async def move(self, targets: list[tuple[str, float]]) -> None:
+        """Go; one that is beyond its limits keeps all of them where they are."""
+        for name, target in targets:
+            low, high = _limits(self.named[name])
+            if not low <= target <= high:
+                raise GcsError(OUTSIDE)
+        for name, target in targets:
+            axis = self.named[name]
+            axis.target = target
+            await self.begin(name, "move_to", axis.in_si(target))
+
+    async def _end(self, axis: AxisService, word: str, ending: "asyncio.Future[dict[str, Any]]") -> None:
         try:
-            await self.axis.ended(word, ending)
+            await axis.ended(word, ending)
         except NotDoneError as error:
             if error.how != "aborted":
                 self.number = IN_ERRORS.get(error.code, UNMOVABLE)
@@ -134,12 +142,19 @@ def command(word: str, about: str) -> Callable[[Handler], Handler]:
 
 
 def shows(word: str, about: str, value: Callable[[AxisService], object]) -> None:
-    """Declare a question about the axis."""
+    """Declare a question about axes."""
 
     async def show(talk: Gcs, values: list[str]) -> str:
-        return talk.shown(values, value(talk.axis))
+        return answered({name: value(talk.named[name]) for name in talk.asked(values)})
 
     command(word, about)(show)
+
+
+def answered(values: Mapping[str, object]) -> str:
+    """What is answered of axes: a line of each."""
+    return "\n".join(
+        f"{name}={value:.7f}" if isinstance(value, float) else f"{name}={value}" for name, value in values.items()
+    )
 
 
 def _limits(axis: AxisService) -> tuple[float, float]:
@@ -179,8 +194,8 @@ async def _(_talk: Gcs, _values: list[str]) -> str:
 
 
 @command("SAI?", "get list of current axis identifiers")
-async def _(_talk: Gcs, _values: list[str]) -> str:
-    return AXIS
+async def _(talk: Gcs, _values: list[str]) -> str:
+    return "\n".join(talk.named)
 
 
 @command("HLP?", "get list of available commands")
@@ -198,64 +213,65 @@ async def _(talk: Gcs, _values: list[str]) -> str:
 
 @command("SVO", "set servo mode")
 async def _(talk: Gcs, values: list[str]) -> None:
-    await (talk.axis.enable() if talk.pairs(values) else talk.axis.do("disable"))
+    for name, on in talk.pairs(values):
+        await (talk.named[name].enable() if on else talk.named[name].do("disable"))
 
 
 @command("MOV", "set target position")
 async def _(talk: Gcs, values: list[str]) -> None:
-    target = talk.pairs(values)
-    low, high = _limits(talk.axis)
-    if not low <= target <= high:
-        raise GcsError(OUTSIDE)
-    talk.axis.target = target
-    await talk.begin("move_to", talk.axis.in_si(target))
+    await talk.move(talk.pairs(values))
 
 
 @command("MVR", "set target relative to current position")
 async def _(talk: Gcs, values: list[str]) -> None:
-    target = talk.axis.target + talk.pairs(values)
-    await HANDLERS["MOV"](talk, [AXIS, repr(target)])
+    await talk.move([(name, talk.named[name].target + way) for name, way in talk.pairs(values)])
 
 
 @command("VEL", "set closed-loop velocity")
 async def _(talk: Gcs, values: list[str]) -> None:
-    speed = talk.pairs(values)
-    if not 0.0 < speed <= talk.axis.speed * (1 + 1e-9):
+    speeds = talk.pairs(values)
+    if any(not 0.0 < speed <= talk.named[name].speed * (1 + 1e-9) for name, speed in speeds):
         raise GcsError(TOO_FAST)
-    talk.speed = speed
+    talk.speeds |= speeds
 
 
 @command("VEL?", "get closed-loop velocity")
 async def _(talk: Gcs, values: list[str]) -> str:
-    return talk.shown(values, talk.speed)
+    return answered({name: talk.speeds[name] for name in talk.asked(values)})
 
 
 @command("FRF", "start reference move to reference switch")
 async def _(talk: Gcs, values: list[str]) -> None:
-    talk.only(values)
-    if "home" in talk.axis.about["commands"]:
-        await talk.begin("home")
-    else:  # an axis that cannot look for its reference has a person's word for it
-        await talk.axis.do("trust", 2)
-    talk.axis.target = talk.axis.position
+    for name in talk.asked(values):
+        axis = talk.named[name]
+        if "home" in axis.about["commands"]:
+            await talk.begin(name, "home")
+        else:  # an axis that cannot look for its reference has a person's word for it
+            await axis.do("trust", 2)
+        axis.target = axis.position
+
+
+async def _halt(talk: Gcs, axes: Iterable[AxisService]) -> None:
+    talk.number = STOPPED  # at once: who asks for it does not wait for rest
+    stopped = list(axes)
+    await asyncio.gather(*(axis.stop() for axis in stopped))
+    for axis in stopped:
+        axis.target = axis.commanded
 
 
 @command("STP", "stop all axes abruptly")
 async def _(talk: Gcs, _values: list[str]) -> None:
-    talk.number = STOPPED  # at once: who asks for it does not wait for rest
-    await talk.axis.stop()
-    talk.axis.target = talk.axis.commanded
+    await _halt(talk, talk.axes)
 
 
 @command("HLT", "halt motion smoothly")
 async def _(talk: Gcs, values: list[str]) -> None:
-    talk.only(values)
-    await HANDLERS["STP"](talk, [])
+    await _halt(talk, [talk.named[name] for name in talk.asked(values)])
 
 
 @command("SAMPLE?", "number of a period, and in it state, position, trust and fault, as all faces show them")
 async def _(talk: Gcs, _values: list[str]) -> str:
-    return str(talk.axis.sample)
+    return "\n".join(str(axis.sample) for axis in talk.axes)
 
 
 async def serve(desk: Desk, address: str) -> list[str]:

@@ -152,9 +152,9 @@ class Grbl(Talk):
 
     end = b"\r\n"
 
-    def __init__(self, axis: AxisService, send: Send, others: tuple[AxisService, ...] = ()) -> None:
-        super().__init__(axis, send)
-        self.machine = Machine((axis, *others))
+    def __init__(self, axes: tuple[AxisService, ...], send: Send) -> None:
+        super().__init__(axes, send)
+        self.machine = Machine(axes)
         self._relative, self._inch, self._mode, self._feed = False, 1.0, "G0", 0.0
         self._tasks: set[asyncio.Future[None]] = set()
 
@@ -206,7 +206,7 @@ class Grbl(Talk):
         places = [axis.position for axis in machine.axes] + [0.0] * (3 - len(machine.axes))
         shown = ",".join(f"{place:.3f}" for place in places)
         speed = math.hypot(*(axis.velocity for axis in machine.axes)) * 60
-        sample = self.axis.sample
+        sample = "/".join(str(axis.sample) for axis in machine.axes)
         # The last field is no word of grbl's own; senders pass over those that they do not know.
         room = PLANNED - len(machine.blocks)
         known = f"<{machine.state}|MPos:{shown}|Bf:{room},128|FS:{speed:.0f},0|WCO:0.000,0.000,0.000"
@@ -368,5 +368,9 @@ class Grbl(Talk):
 
 
 async def serve(desk: Desk, address: str) -> list[str]:
-    """Serve; gives what a client needs."""
-    return await serve_lines(desk, address, Grbl, PORT)
+    """Serve; gives what a client needs: where it listens, and of several axes what each is called."""
+    if len(desk.channels) > len(LETTERS):
+        got = f"{desk.face}: got the motors {', '.join(desk.channels)}"
+        raise DetentError(f"{got}; expected: three at most, X, Y and Z; name one with --motor")
+    named = [f"{letter} = {motor}" for letter, motor in zip(LETTERS, desk.channels, strict=False) if motor]
+    return await serve_lines(desk, address, Grbl, PORT) + named

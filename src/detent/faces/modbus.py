@@ -218,24 +218,26 @@ class Slave:
                     await self.axis.hold()
 
 
-def device_of(slave: Slave, name: str) -> SimDevice:
-    """The registers as pymodbus serves them."""
+def device_of(slave: Slave, unit: int) -> SimDevice:
+    """The registers as pymodbus serves them, as a unit; 0: whatever a client asks for."""
     identity = ModbusDeviceIdentification(info_name={
-        "VendorName": "detent", "ProductCode": "axis", "MajorMinorRevision": "1", "ProductName": name,
-        "ModelName": slave.axis.about["method"],
+        "VendorName": "detent", "ProductCode": "axis", "MajorMinorRevision": "1",
+        "ProductName": slave.axis.about["name"], "ModelName": slave.axis.about["method"],
     })  # fmt: skip
     data = [SimData(0, values=[0] * SIZE, datatype=DataType.REGISTERS)]
-    return SimDevice(id=0, simdata=data, action=slave.access, identity=identity)
+    return SimDevice(id=unit, simdata=data, action=slave.access, identity=identity)
 
 
 async def serve(desk: Desk, address: str) -> list[str]:
     """Serve; gives what a client needs."""
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL + 1)  # it tells of every frame that is none
     host, number = address_of(desk.face, address, PORT)
-    slave = Slave(await desk.open())
-    device = device_of(slave, slave.axis.about["name"])
-    server = ModbusTcpServer(device, address=(host, number), identity=device.identity)
+    slaves = [Slave(axis) for axis in await desk.open()]
+    devices = [device_of(slave, k if slaves[1:] else 0) for k, slave in enumerate(slaves, 1)]
+    server = ModbusTcpServer(devices, address=(host, number), identity=devices[0].identity)
     await server.serve_forever(background=True)
-    desk.keep(asyncio.ensure_future(slave.watch()))
+    for slave in slaves:
+        desk.keep(asyncio.ensure_future(slave.watch()))
     port = server.transport.sockets[0].getsockname()[1]  # type: ignore[union-attr]
-    return [f"{host}:{port}", "unit 1"]
+    units = [f"unit {k}" + (f" = {slave.axis.motor}" if slave.axis.motor else "") for k, slave in enumerate(slaves, 1)]
+    return [f"{host}:{port}", *units]

@@ -7,7 +7,6 @@ a thread of python-can; what it writes is done in the order in which it came, in
 import asyncio
 import time
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import can
@@ -418,7 +417,7 @@ async def serve(desk: Desk, address: str) -> list[str]:
     bus, number, _ = read_address(address if "@" in address else f"{address}@1")
     if bus["interface"] not in ("socketcan", "slcan", "pcan", "kvaser", "ixxat", "serial", "gs_usb"):
         del bus["bitrate"]
-    axis = await desk.open()
+    axes = await desk.open()
     network: Any = canopen.Network()
     try:
         network.connect(**bus)
@@ -426,12 +425,16 @@ async def serve(desk: Desk, address: str) -> list[str]:
         raise DetentError(
             f"{bus['interface']} {bus['channel']}: no such bus ({error}); name one of python-can"
         ) from error
-    node = Node(axis, number)
-    node.join(network)
     desk.server = network
-    sheet = Path(desk.channel).with_suffix(".eds")
-    canopen.export_od(node.node.object_dictionary, str(sheet))
-    for work in (node.obey(), node.watch()):
-        desk.keep(asyncio.ensure_future(work))
-    wanted = ", ".join(f"0x{base + number:X}" for base in (0x80, 0x180, 0x280, 0x580, 0x700))
-    return [f"{bus['interface']} {bus['channel']}, node {number}", f"can_filters {wanted}", f"EDS {sheet}"]
+    told: list[str] = []
+    for one, axis in enumerate(axes, number):
+        node = Node(axis, one)
+        node.join(network)
+        sheet = desk.channels[axis.motor].with_suffix(".eds")
+        canopen.export_od(node.node.object_dictionary, str(sheet))
+        for work in (node.obey(), node.watch()):
+            desk.keep(asyncio.ensure_future(work))
+        wanted = ", ".join(f"0x{base + one:X}" for base in (0x80, 0x180, 0x280, 0x580, 0x700))
+        place = f"{bus['interface']} {bus['channel']}, node {one}" + (f" = {axis.motor}" if axis.motor else "")
+        told += [place, f"can_filters {wanted}", f"EDS {sheet}"]
+    return told

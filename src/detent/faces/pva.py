@@ -50,7 +50,7 @@ class Served:
     """PVs of a record."""
 
     def __init__(self, name: str) -> None:
-        self._name, self.provider = name, StaticProvider("detent")
+        self._name, self.provider = name, StaticProvider(name)
         self.pvs: dict[str, Any] = {}
         self.motor: Motor
 
@@ -110,17 +110,20 @@ class Served:
 async def serve(desk: Desk, address: str) -> list[str]:
     """Serve; gives what a client needs."""
     name, host, port = name_of("pva", address, PORT)
-    axis = await desk.open()
-    served = Served(name)
-    motor = Motor(axis, served.show)
-    served.open(motor)
+    names, providers = list[str](), list[Any]()
+    for axis in await desk.open():
+        names.append(f"{name}:{axis.motor}" if axis.motor else name)
+        served = Served(names[-1])
+        motor = Motor(axis, served.show)
+        served.open(motor)
+        providers.append(served.provider)
+        for work in (motor.follow(), served.follow()):
+            desk.keep(asyncio.ensure_future(work))
     conf = {
         "EPICS_PVAS_INTF_ADDR_LIST": host, "EPICS_PVAS_SERVER_PORT": str(port),
         "EPICS_PVAS_BROADCAST_PORT": str(port + 1),
         "EPICS_PVAS_AUTO_BEACON_ADDR_LIST": "NO", "EPICS_PVAS_BEACON_ADDR_LIST": host,
     }  # fmt: skip
-    desk.server = Server(providers=[served.provider], conf=conf, useenv=False)
-    desk.keep(asyncio.ensure_future(motor.follow()))
-    desk.keep(asyncio.ensure_future(served.follow()))
+    desk.server = Server(providers=providers, conf=conf, useenv=False)
     told = f"EPICS_PVA_ADDR_LIST={host} EPICS_PVA_AUTO_ADDR_LIST=NO EPICS_PVA_BROADCAST_PORT={port + 1}"
-    return [f"pva://{name}", told]
+    return [*(f"pva://{one}" for one in names), told]

@@ -66,8 +66,8 @@ def pattern_of(header: str) -> re.Pattern[str]:
 class Scpi(Talk):
     """One client."""
 
-    def __init__(self, axis: AxisService, send: Send) -> None:
-        super().__init__(axis, send)
+    def __init__(self, axes: tuple[AxisService, ...], send: Send) -> None:
+        super().__init__(axes, send)
         self._errors: deque[tuple[int, str]] = deque()
         self._events, self.enabled_events, self.service = POWER_ON, 0, 0
         self._pending: set[asyncio.Future[None]] = set()
@@ -118,16 +118,20 @@ class Scpi(Talk):
 
     # ---- motions
 
+    async def stop(self) -> None:
+        """Every axis comes to rest."""
+        await asyncio.gather(*(axis.stop() for axis in self.axes))
+
     async def overlap(self, word: str, value: object = None, speed: float = 1.0) -> None:
         """Begin what takes its time; that it was not done is found in the queue of errors."""
-        ending = await self.axis.start(word, value, speed)
-        task = asyncio.ensure_future(self._end(word, ending))
+        axis = self.axis
+        task = asyncio.ensure_future(self._end(axis, word, await axis.start(word, value, speed)))
         self._pending.add(task)
         task.add_done_callback(self._pending.discard)
 
-    async def _end(self, word: str, ending: "asyncio.Future[dict[str, Any]]") -> None:
+    async def _end(self, axis: AxisService, word: str, ending: "asyncio.Future[dict[str, Any]]") -> None:
         try:
-            await self.axis.ended(word, ending)
+            await axis.ended(word, ending)
         except NotDoneError as error:
             if error.how != "aborted":  # a stop is no error
                 self._note(code_of(error), str(error))
@@ -262,7 +266,8 @@ async def _(talk: Scpi, _values: list[str]) -> None:
 @command("*RST", "stop; errors and settings of the client are those at its beginning")
 async def _(talk: Scpi, _values: list[str]) -> None:
     talk.clear()
-    await talk.axis.stop()
+    talk.axis = talk.axes[0]
+    await talk.stop()
 
 
 @command("*TST?", "0 where no fault stands, else its number")
@@ -288,9 +293,28 @@ async def _(talk: Scpi, _values: list[str]) -> None:
     await talk.axis.do("confirm")
 
 
-@command("STOP", "come to rest, and hold")
+@command("STOP", "come to rest, and hold: all axes")
 async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.axis.stop()
+    await talk.stop()
+
+
+@command("INSTrument:CATalog?", "names of the axes, of a file with several motors")
+async def _(talk: Scpi, _values: list[str]) -> str:
+    return ",".join(f'"{axis.motor}"' for axis in talk.axes)
+
+
+@command("INSTrument:SELect", "the axis that what follows is about: its name, quoted or not", 1)
+async def _(talk: Scpi, values: list[str]) -> None:
+    name = values[0].strip("\"'")
+    named = [axis for axis in talk.axes if axis.motor == name]
+    if not named:
+        raise ScpiError(-222, f"{name:.20}: {', '.join(axis.motor for axis in talk.axes)}")
+    talk.axis = named[0]
+
+
+@command("INSTrument:SELect?", "which that is")
+async def _(talk: Scpi, _values: list[str]) -> str:
+    return f'"{talk.axis.motor}"'
 
 
 @command("RESet", "leave a fault")

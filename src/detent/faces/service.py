@@ -6,7 +6,7 @@ that does not depend on how many clients the face has, for they share the newest
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,8 +52,8 @@ class Sample:
 class AxisService:
     """A client of an axis; `commands` False: it reads, and stops."""
 
-    def __init__(self, line: Line, about: dict[str, Any], *, commands: bool) -> None:
-        self._line, self.about, self.commands = line, about, commands
+    def __init__(self, line: Line, about: dict[str, Any], motor: str = "", *, commands: bool) -> None:
+        self._line, self.about, self.motor, self.commands = line, about, motor, commands
         self.unit, self.scale = USER_UNITS.get(about["unit"], (about["unit"], 1.0))
         self.count: float = about["count"] * self.scale  # of the sensor
         self.origin: float = about["origin"] * self.scale  # position of count 0
@@ -74,10 +74,10 @@ class AxisService:
         line.watched = self._take
 
     @classmethod
-    async def open(cls, channel: Path, who: str, *, commands: bool = False) -> "AxisService":
+    async def open(cls, channel: Path, who: str, motor: str = "", *, commands: bool = False) -> "AxisService":
         """Attach to an axis, under a name that its panel shows and its log keeps."""
         line = await Line.open(channel, who)
-        service = cls(line, (await line.ask({"do": "describe"}))["describe"], commands=commands)
+        service = cls(line, (await line.ask({"do": "describe"}))["describe"], motor, commands=commands)
         await line.ask({"do": "watch", "rate": RATE})
         await asyncio.wait_for(service._come.wait(), PATIENCE)
         service.target = service.position
@@ -321,21 +321,30 @@ class AxisService:
 
 
 class Desk:
-    """What the process of a face is told: where the axis is, and whether it may be commanded."""
+    """What the process of a face is told: where the axes are, by motor, and whether they may be commanded."""
 
-    def __init__(self, channel: Path, face: str, commands: bool = False) -> None:  # noqa: FBT001, FBT002 - from data
-        self.channel, self.face, self.commands = channel, face, commands
+    def __init__(  # from data
+        self, channels: Mapping[str, Path], face: str, commands: bool = False,  # noqa: FBT001, FBT002
+    ) -> None:  # fmt: skip
+        self.channels, self.face, self.commands = channels, face, commands
         self._services: list[AxisService] = []
         self._tasks: list[asyncio.Future[Any]] = []
         self.server: Any = None  # what else must stay for as long as the face does
 
-    async def open(self, who: str = "") -> AxisService:
-        """Another client of the axis; `who` is at the other end."""
+    async def open(self, who: str = "") -> tuple[AxisService, ...]:
+        """Another client, of every axis; `who` is at the other end."""
         name = f"{self.face} face" + (f", {who}" if who else "")
-        service = await AxisService.open(self.channel, name, commands=self.commands)
+        opened: list[AxisService] = []
+        try:
+            for motor, channel in self.channels.items():
+                opened.append(await AxisService.open(channel, name, motor, commands=self.commands))
+        except BaseException:
+            for service in opened:
+                service.close()
+            raise
         if not who:  # a client that has come leaves again
-            self._services.append(service)
-        return service
+            self._services += opened
+        return tuple(opened)
 
     def close(self) -> None:
         """Leave the axis."""
@@ -347,10 +356,10 @@ class Desk:
         self._tasks.append(task)
 
     async def ended(self) -> None:
-        """Wait until the face cannot go on: the axis has gone, or its work has ended."""
+        """Wait until the face cannot go on: an axis has gone, or its work has ended."""
         if not self._services:
-            self._services.append(await AxisService.open(self.channel, f"{self.face} face", commands=False))
-        ends = [asyncio.ensure_future(self._services[0].gone.wait()), *self._tasks]
+            await self.open()
+        ends = [*(asyncio.ensure_future(service.gone.wait()) for service in self._services), *self._tasks]
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
 
 

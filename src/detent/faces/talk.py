@@ -10,7 +10,6 @@ import os
 import tty
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
 
 from detent.errors import DetentError
 from detent.faces.service import AxisService, Desk, address_of
@@ -28,8 +27,8 @@ class Talk:
     end = b"\n"  # of what is answered
     waits = True  # a line waits until the one before it was answered
 
-    def __init__(self, axis: AxisService, send: Send) -> None:
-        self.axis, self._send = axis, send
+    def __init__(self, axes: tuple[AxisService, ...], send: Send) -> None:
+        self.axes, self.axis, self._send = axes, axes[0], send
 
     def send(self, text: str) -> None:
         """Say something."""
@@ -105,7 +104,10 @@ class Reader:
         self._talk.leave()
 
 
-async def serve_lines(desk: Desk, address: str, dialect: Callable[[AxisService, Send], Talk], port: int) -> list[str]:
+Dialect = Callable[[tuple[AxisService, ...], Send], Talk]
+
+
+async def serve_lines(desk: Desk, address: str, dialect: Dialect, port: int) -> list[str]:
     """Listen on TCP, or where the address is "pty", on a terminal; gives how a client finds it."""
     if address == "pty":
         return [await _open_terminal(desk, dialect)]
@@ -133,11 +135,10 @@ async def serve_lines(desk: Desk, address: str, dialect: Callable[[AxisService, 
 
 
 async def _talk(
-    axis: AxisService, dialect: Callable[[AxisService, Send], Talk], reader: asyncio.StreamReader,
-    writer: asyncio.StreamWriter,
-) -> None:  # fmt: skip
+    axes: tuple[AxisService, ...], dialect: Dialect, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+) -> None:
     """One client on TCP, until it leaves."""
-    lines = Reader(dialect(axis, writer.write))
+    lines = Reader(dialect(axes, writer.write))
     try:
         with suppress(ConnectionError):
             while data := await reader.read(LONGEST):
@@ -145,16 +146,16 @@ async def _talk(
                 await writer.drain()
     finally:
         lines.close()
-        axis.close()
+        for axis in axes:
+            axis.close()
 
 
-async def _open_terminal(desk: Desk, dialect: Callable[[AxisService, Send], Talk]) -> str:
+async def _open_terminal(desk: Desk, dialect: Dialect) -> str:
     """A serial line that is none: a pair of terminals, of which a client opens the other end."""
     ours, theirs = os.openpty()  # their end stays open here: a client that closes it may come again
     tty.setraw(theirs)
     os.set_blocking(ours, False)
-    axis: Any = await desk.open("terminal")
-    lines = Reader(dialect(axis, lambda data: os.write(ours, data)))
+    lines = Reader(dialect(await desk.open("terminal"), lambda data: os.write(ours, data)))
 
     def read() -> None:
         with suppress(BlockingIOError, OSError):

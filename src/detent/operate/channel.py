@@ -65,11 +65,25 @@ def runtime_folder() -> Path:
     return folder
 
 
-def channel_of(file: Path) -> Path:
-    """Socket of the axis that a file describes."""
+def channel_of(file: Path, motor: str = "") -> Path:
+    """Socket of the axis that a file describes, or of one of its motors, of a file with several."""
     path = file.resolve()
-    stem = "".join(c if c.isascii() and c.isalnum() else "-" for c in path.stem)[:32]
-    return runtime_folder() / f"{stem}-{sha256(str(path).encode()).hexdigest()[:10]}.sock"
+    stem = "".join(c if c.isascii() and c.isalnum() else "-" for c in path.stem)[: 32 - len(motor[:24])]
+    name = [f"{stem}-{sha256(str(path).encode()).hexdigest()[:10]}", *([motor] if motor else []), "sock"]
+    return runtime_folder() / ".".join(name)
+
+
+def running_channel(file: Path, motor: str = "") -> Path:
+    """Socket of the motor that is named, or of the only one of a file that runs."""
+    alone = channel_of(file)
+    if alone.exists() or motor:
+        return alone if alone.exists() else channel_of(file, motor)
+    mark = alone.stem.rpartition("-")[2]
+    several = {path.name.split(".")[-2]: path for path in sorted(alone.parent.glob(f"*-{mark}.*.sock"))}
+    if len(several) > 1:
+        got = f"{shown(str(file))}: its motors run live, each by itself"
+        raise DetentError(f"{got}; expected: the name of one, {' or '.join(several)}; name it with --motor")
+    return next(iter(several.values()), alone)
 
 
 @dataclass

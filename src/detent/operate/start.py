@@ -13,7 +13,7 @@ from detent.errors import AxisError, DetentError
 from detent.methods.load import AxisFile, read_axis
 from detent.methods.registry import METHODS
 from detent.operate.audit import Audit
-from detent.operate.channel import Channel, Connection, channel_of
+from detent.operate.channel import Channel, Connection, channel_of, running_channel
 from detent.operate.client import LiveAxis
 from detent.operate.drivers.driver import SIMULATED, driver_of
 from detent.operate.host import PERIOD, Host, operation_params
@@ -35,6 +35,15 @@ def shared_memory() -> tuple[int, mmap]:
             file = os.dup(unnamed.fileno())
     os.ftruncate(file, ctypes.sizeof(Board))
     return file, mmap(file, 0)
+
+
+def motors_of(read: AxisFile, motor: str = "") -> list[str]:
+    """Motors of a file that run live: the one that is named, else all of them; of a file with one, "" means it."""
+    method = METHODS[read.spec.axis.method]
+    motors = list(method.sensors(read.spec)) if method.senses else [""]
+    if motor and motor not in motors:
+        method.live(read.spec, operation_params(), motor)  # says what there is
+    return [""] if len(motors) == 1 else [motor] if motor else motors
 
 
 def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
@@ -150,13 +159,15 @@ def live(  # noqa: PLR0913 - as `make_host`
     return LiveAxis(Session(host, {"name": name, "file": str(file), "simulated": host.link is None, "speed": speed}))
 
 
-def connect(file: Path | str) -> LiveAxis:
+def connect(file: Path | str, motor: str = "") -> LiveAxis:
     """The axis of a file that another process runs live, or the one behind a socket.
 
     Parameters
     ----------
     file : path
         Axis file that was given to ``detent live``, or the socket that it has printed.
+    motor : str, optional
+        Which motor, of a file with several that run.
 
     Returns
     -------
@@ -164,7 +175,7 @@ def connect(file: Path | str) -> LiveAxis:
         Closing it gives the command back, and stops what it had under way; the axis stays live.
     """
     path = Path(file)
-    link = Connection(path if path.suffix == ".sock" else channel_of(path))
+    link = Connection(path if path.suffix == ".sock" else running_channel(path, motor))
     try:
         return LiveAxis(link)
     except DetentError:
@@ -173,10 +184,10 @@ def connect(file: Path | str) -> LiveAxis:
 
 
 class Place:
-    """The right to run an axis: one process at a time."""
+    """The right to run an axis, or one motor of a file with several: one process at a time."""
 
-    def __init__(self, file: Path) -> None:
-        self.channel = channel_of(file)
+    def __init__(self, file: Path, motor: str = "") -> None:
+        self.channel = channel_of(file, motor)
         self._lock: IO[str] = self.channel.with_suffix(".lock").open("a+")
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
