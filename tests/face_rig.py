@@ -29,6 +29,12 @@ class Faced(Running):
         """What is printed of a face."""
         return self.started["faces"][face][number]
 
+    @property
+    def channels(self) -> dict[str, Path]:
+        """Of each motor that runs."""
+        axes = self.started.get("axes", {"": self.started})
+        return {motor: Path(one["channel"]) for motor, one in axes.items()}
+
     def port(self, face: str) -> str:
         """Port of a face that listens on TCP."""
         return next(place for place in self.started["faces"][face] if "::" not in place).rpartition(":")[2]
@@ -62,9 +68,9 @@ def faced(
                 live.process.communicate()
 
 
-def connected(live: Faced) -> Any:
+def connected(live: Faced, motor: str = "") -> Any:
     """A client of detent's own, to see what happens, and to command beside."""
-    return detent.connect(live.started["channel"])
+    return detent.connect(live.channels[motor])
 
 
 def listening(*processes: int) -> set[tuple[str, str]]:
@@ -127,7 +133,7 @@ def drive_on_virtual(live: Faced, channel: str, *, commands: bool = True) -> Ite
     loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
-    desk = Desk({"": Path(live.started["channel"])}, "canopen", commands)
+    desk = Desk(live.channels, "canopen", commands)
     network = canopen.Network()
     network.connect(interface="virtual", channel=channel)
     try:

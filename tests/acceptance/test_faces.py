@@ -6,6 +6,7 @@ What each of them needs to be told is what `detent live` prints.
 import json
 import os
 import re
+import shutil
 import signal
 import socket
 import struct
@@ -19,12 +20,14 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import httpx
 import numba
 import pytest
 from tests import foreign
 from tests.face_rig import Faced, connected, drive_on_virtual, faced, family, listening, wire
 from tests.places import ROOT
 
+import detent
 from detent.faces.child import FACES
 from detent.faces.set_points import SetPoints
 
@@ -956,6 +959,114 @@ def test_28_four_faces_and_a_panel_show_the_same_sample(axis, plain):
     assert compared >= 1000
     assert len({count for _, count, _, _ in shown[4].values()}) > 100  # it did move
     assert late <= 1.5 * without + 0.005
+
+
+# ---- a stage with two motors
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Faced]:
+    """The example of a microscope stage, both motors, with its list of tiles beside its file."""
+    pytest.importorskip("caproto")
+    folder = tmp_path_factory.mktemp("stage")
+    shutil.copy(detent.example("tiles.csv"), folder)
+    record = f"lab:stage@:{free_port()}"
+    with faced(folder, *LINES, "--epics", record, "--headless", example="stage.toml") as live:
+        yield live
+
+
+STEP = 0.005  # of the stage [mm]
+
+
+def visited(stage: Faced, name: str, what: str, *words: str, **environ: str) -> None:
+    """Every tile of the file, in its order, to a step of the motors."""
+    found = foreign.run(name, "tiles", what, str(stage.file.with_name("tiles.csv")), *words, **environ)
+    assert len(found["asked"]) == len(found["found"]) == 12
+    for asked, place in zip(found["asked"], found["found"], strict=True):
+        assert place == pytest.approx(asked, abs=STEP * 0.5001)
+
+
+def test_30_a_stage_is_two_motors_of_epics_and_bluesky_visits_its_tiles(stage):
+    assert [stage.place("epics", k) for k in (0, 1)] == ["lab:stage:x", "lab:stage:y"]
+    environ = dict(word.split("=") for word in stage.place("epics", 2).split())
+    visited(stage, "epics", "bluesky", "lab:stage", **environ)
+
+
+def test_30_a_stage_is_two_axes_of_grbl(stage):
+    assert stage.started["faces"]["grbl"][1:] == ["X = x", "Y = y"]
+    visited(stage, "grbl", "grbl", stage.place("grbl"))
+
+
+def test_30_a_stage_is_two_axes_of_gcs(stage):
+    visited(stage, "pi", "gcs", stage.port("gcs"))
+
+
+def test_30_a_stage_is_two_axes_of_a_zaber_device(stage):
+    with connected(stage, "x") as x, connected(stage, "y") as y:
+        about = [one.link.describe() for one in (x, y)]
+    assert [one["count"] * 1e3 for one in about] == pytest.approx([STEP, STEP])
+    visited(stage, "zaber", "zaber", stage.port("zaber"), str(STEP), *(str(one["origin"] * 1e3) for one in about))
+
+
+def test_30_a_stage_is_two_nodes_of_cia_402(stage):
+    p402 = pytest.importorskip("canopen.profiles.p402")
+    from tests.clients.p402 import patient
+
+    with drive_on_virtual(stage, "stage") as (desk, network, _):
+        nodes = []
+        for number, motor in ((5, "x"), (6, "y")):
+            node = patient(p402.BaseNode402(number, str(desk.channels[motor].with_suffix(".eds"))))
+            network.add_node(node)
+            node.nmt.send_command(0x80)
+            node.setup_402_state_machine()
+            node.nmt.send_command(0x01)
+            nodes.append(node)
+        for node in nodes:
+            node.sdo[0x6060].raw = 1
+            for word in (0x06, 0x07, 0x0F):
+                node.sdo[0x6040].raw = word
+        for node in nodes:
+            comes(node, "OPERATION ENABLED")
+        for node, target in zip(nodes, (11_100, 8_060), strict=True):
+            node.sdo[0x607A].raw = target
+            node.sdo[0x6040].raw = 0x1F
+            until(lambda node=node: node.sdo[0x6041].raw >> 12 & 1)
+            node.sdo[0x6040].raw = 0x0F
+        for node, target in zip(nodes, (11_100, 8_060), strict=True):
+            until(lambda node=node: node.sdo[0x6041].raw >> 10 & 1)
+            assert node.sdo[0x6064].raw == target
+        for node in nodes:
+            node.sdo[0x6040].raw = 0
+
+
+def test_30_a_stage_is_two_devices_and_instruments_everywhere_else(stage):
+    from pymodbus.client import ModbusTcpClient
+
+    from detent.faces.modbus import signed
+
+    with connected(stage, "x") as x, connected(stage, "y") as y:
+        for own, place in ((x, "1 mm"), (y, "-2 mm")):
+            own.do("take")
+            own.enable()
+            own.confirm()
+            own.move_to(place)
+            own.do("leave")
+    client = ModbusTcpClient("127.0.0.1", port=int(stage.port("modbus")))
+    client.connect()
+    counts = [signed(client.read_holding_registers(16, count=2, device_id=unit).registers) for unit in (1, 2)]
+    client.close()
+    assert counts == [11_200, 7_600]  # from the lower ends, -55 and -40 mm, in steps
+    with socket.create_connection(("127.0.0.1", int(stage.port("scpi")))) as line:
+        line.sendall(b"INST:CAT?\nINST:SEL?;POS?\nINST:SEL 'y';POS?\nINST:SEL z\nSYST:ERR?\n")
+        answers = line.makefile("r")
+        told = [answers.readline().strip() for _ in range(4)]
+    assert told[:3] == ['"x","y"', '"x";1', "-2"]
+    assert told[3].startswith('-222,"Data out of range; z: x, y')
+    numbers = [
+        httpx.get(f"http://{stage.place('alpaca')}/api/v1/focuser/{k}/connected").json()["ErrorNumber"] for k in (0, 1)
+    ]
+    assert numbers == [0, 0]
+    assert httpx.get(f"http://{stage.place('alpaca')}/api/v1/focuser/2/connected").status_code == 400
 
 
 PAGES = {
