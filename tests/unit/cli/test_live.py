@@ -1,6 +1,7 @@
 """`detent live` and `detent connect`, called in this process: what they say, write down and refuse."""
 
 import json
+import shutil
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -12,12 +13,15 @@ from tests.live_bench import Bench
 from tests.live_processes import live_folder
 from typer.testing import CliRunner, Result
 
+import detent
 from detent.cli import app
 from detent.cli import live as commands
+from detent.cli.running import places
 from detent.operate.audit import Audit
-from detent.operate.channel import Channel, channel_of
+from detent.operate.channel import Channel, channel_of, running_channel
 from detent.operate.host import Log
 from detent.operate.session import Session
+from detent.panel.child import PanelPlace
 from detent.panel.keys import keep_keys, keys_of, make_keys
 
 pytestmark = pytest.mark.compiled  # it lives in wall time
@@ -105,6 +109,40 @@ def test_where_no_axis_lives_it_says_how_to_start_one(file: Path) -> None:
 
 
 @pytest.fixture
+def stage(file: Path) -> Path:
+    """An axis file with two motors."""
+    return Path(shutil.copy(detent.example("stage.toml"), file.with_name("stage.toml")))
+
+
+def test_what_is_for_one_motor_is_refused_for_two(stage: Path) -> None:
+    for more in (("--record", "log"), ("--store", "kept"), ("--drive", "serial:/dev/ttyACM0")):
+        refused = call("live", stage, "--headless", *more)
+        assert (refused.exit_code, refused.stdout) == (2, "")
+        assert f"{more[0]}: got {stage} with the motors x, y; expected: one of them; name it, as --motor x" in (
+            " ".join(refused.stderr.split())
+        )
+    assert "got the motor z; expected: one of x, y" in call("live", stage, "--headless", "--motor", "z").stderr
+
+
+def test_of_two_motors_that_run_one_is_named(stage: Path) -> None:
+    channels = [channel_of(stage, motor) for motor in ("x", "y")]
+    assert len({*channels, channel_of(stage)}) == 3
+    assert running_channel(stage) == channel_of(stage)
+    channels[1].touch()
+    assert running_channel(stage) == running_channel(stage, "y") == channels[1]
+    channels[0].touch()
+    told = call("connect", stage)
+    assert (told.exit_code, "x or y; name it with --motor" in " ".join(told.stderr.split())) == (2, True)
+    assert running_channel(stage, "x") == channels[0]
+
+
+def test_panels_of_two_motors_are_side_by_side() -> None:
+    pair: Any = (None, None)
+    assert [at.port for at in places(PanelPlace(port=8080), pair)] == [8080, 8081]
+    assert [at.port for at in places(PanelPlace(), pair)] == [0, 0]
+
+
+@pytest.fixture
 def heard(monkeypatch: pytest.MonkeyPatch) -> dict[int, Callable[..., Any]]:
     """Signals that the command wants to hear."""
     found: dict[int, Callable[..., Any]] = {}
@@ -137,6 +175,19 @@ def test_a_program_is_told_in_data(file: Path, heard: dict[int, Any]) -> None:
     status = json.loads(ended)["ended"]
     assert (status["rests"], status["state"]) == (True, "switch on disabled")
     heard[signal.SIGTERM](signal.SIGTERM, None)  # one that comes late is no trouble
+
+
+@pytest.mark.usefixtures("heard")
+def test_two_motors_live_and_end_at_rest(stage: Path) -> None:
+    told = call("live", stage, "--headless", "--no-store", "--period", "10 ms", "--for", "0.01", "--json").stdout
+    started, _, ended = told.partition("\n")
+    axes = json.loads(started)["axes"]
+    assert [axes[motor]["name"] for motor in "xy"] == ["microscope stage, x", "microscope stage, y"]
+    assert all(status["rests"] for status in json.loads(ended)["ended"].values())
+    lines = call("live", stage, "--headless", "--period", "10 ms", "--for", "0.01").stdout.splitlines()
+    assert f"From a second terminal: detent connect {stage} --motor y enable" in "\n".join(lines)
+    assert sum(line.startswith(("x: at rest", "y: at rest")) for line in lines) == 2
+    assert all(stage.with_name(f"stage.toml.{motor}.state").exists() for motor in "xy")
 
 
 def test_a_place_in_the_table_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
