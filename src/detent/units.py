@@ -151,6 +151,15 @@ def format_quantity(value: float, unit: str, digits: int = 4) -> str:
     return f"{value / scale:.{digits}g} {prefixed}"
 
 
+def format_place(value: float, unit: str) -> str:
+    """Write a position for people: what rounding has left of a zero, below a picometre or a picoradian, is none.
+
+    >>> format_place(4.2e-18, "m"), format_place(0.1234567, "m")
+    ('0 m', '123.457 mm')
+    """
+    return format_quantity(round(value, 12) + 0.0, unit, 6)
+
+
 def in_unit_of(value: float, unit: str, like: str, digits: int = 4) -> str:
     """Write an SI value in the unit that a text has, spaced as there; with a prefix of its own if that has none.
 

@@ -18,7 +18,7 @@ import typer
 from detent.cli.app import DONE, NOT_DONE, Json, Set, app, option
 from detent.cli.terminal import print_json, tell
 from detent.errors import DetentError
-from detent.units import format_quantity
+from detent.units import format_place
 
 File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=False)]
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
@@ -177,9 +177,9 @@ def _tell_end(ends: dict[str, dict[str, Any]], units: dict[str, str], *, as_json
         print_json({"ended": ends if len(ends) > 1 else next(iter(ends.values()))})
         return
     for motor, status in ends.items():
-        tell(f"{f'{motor}: at' if motor else 'At'} rest at {status['position']:.6g} {units[motor]}, torque off; "
-             f"{status['loop']['periods']} periods, {status['loop']['skipped']} skipped, latest "
-             f"{status['loop']['worst'] * 1e6:.0f} us.")  # fmt: skip
+        at, loop = f"{motor}: at" if motor else "At", status["loop"]
+        tell(f"{at} rest at {format_place(status['position'], units[motor])}, torque off; {loop['periods']} periods, "
+             f"{loop['skipped']} skipped, latest {loop['worst'] * 1e6:.0f} us.")  # fmt: skip
         if status["store"]:
             tell(f"Where it stands is kept in {status['store']['path']}")
 
@@ -245,7 +245,7 @@ def _tell_faces(started: dict[str, Any]) -> None:
 
 def _tell_store(file: str, started: dict[str, Any]) -> None:
     """What is kept, and where the axis stands."""
-    store, place = started["store"], format_quantity(started["position"], started["unit"], 6)
+    store, place = started["store"], format_place(started["position"], started["unit"])
     if store is None:
         tell(f"Nothing is kept: the simulated axis begins where its file puts it, {place} ({started['trust']}).")
         return
@@ -319,7 +319,7 @@ def _show_positions(table: list[dict[str, Any]], unit: str, *, as_json: bool) ->
         return
     for row in table:
         used = f", last used {row['used']}" if row["used"] else ""
-        tell(f"{row['name']}: {format_quantity(row['position'], unit, 6)}, {row['counts']} counts, "
+        tell(f"{row['name']}: {format_place(row['position'], unit)}, {row['counts']} counts, "
              f"taught {row['taught']}{used}")  # fmt: skip
     if not table:
         tell("No positions yet; teach the first one with: detent connect FILE teach 1")

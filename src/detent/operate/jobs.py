@@ -12,7 +12,7 @@ from detent.control.program import PLACES
 from detent.errors import DetentError
 from detent.files.text import short
 from detent.methods.method import Leg, Live
-from detent.units import format_quantity
+from detent.units import format_place
 
 MOST_MOVES = 100_000
 LONGEST_REST = 1e5  # [s]
@@ -109,7 +109,7 @@ def _refuse_beyond(legs: Sequence[Leg], axis: Live) -> None:
     lowest, highest = (-math.inf, math.inf) if q.operation.endless else (q.operation.lowest, q.operation.highest)
     for number, leg in enumerate(legs, 1):
         if leg.kind == ops.MOVE_TO and not lowest <= leg.value <= highest:
-            got, *ends = (format_quantity(one, axis.unit, 6) for one in (leg.value, lowest, highest))
+            got, *ends = (format_place(one, axis.unit) for one in (leg.value, lowest, highest))
             raise DetentError(
                 f"job, move {number}: got {got}; expected: a place from {ends[0]} to {ends[1]}; correct it"
             )

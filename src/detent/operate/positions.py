@@ -21,7 +21,7 @@ from detent.files.source import parse_source
 from detent.files.text import check_target, decode_utf8, read_data, short, write_text
 from detent.methods.position import PositionSensor
 from detent.operate.rows import LARGEST, MOST_NAME, MOST_POSITIONS, NAME, Position, is_name
-from detent.units import format_quantity
+from detent.units import format_place
 
 AnyRow = TypeVar("AnyRow", bound=Row)
 
@@ -96,14 +96,14 @@ def _faults(file: str, made: Iterable[tuple[int, PositionRow]], sensor: Position
         meant = sensor.position(counts)
         if row.position is not None and abs(meant - row.position) > 0.5 * sensor.scale + _ROUNDED * abs(meant):
             yield FileProblem(
-                file, line, 1, "counts", f"{counts} counts at {format_quantity(row.position, sensor.unit, 6)}",
+                file, line, 1, "counts", f"{counts} counts at {format_place(row.position, sensor.unit)}",
                 f"{sensor.counts(row.position)} counts, as this axis has there",
                 "the table is of an axis with another scale: take the counts out where the positions hold, and the "
                 "positions where the counts do",
             )  # fmt: skip
         elif not low <= counts <= high:
-            ends = " to ".join(format_quantity(sensor.position(end), sensor.unit, 6) for end in (low, high))
-            got = f"{format_quantity(meant, sensor.unit, 6)} ({counts} counts)"
+            ends = " to ".join(format_place(sensor.position(end), sensor.unit) for end in (low, high))
+            got = f"{format_place(meant, sensor.unit)} ({counts} counts)"
             yield FileProblem(file, line, 1, key, got, ends, "give a place within the travel")
 
 

@@ -35,7 +35,7 @@ from detent.operate.rows import (
 from detent.operate.sealed import Change, Connect, connect
 from detent.operate.trust import Judgement, Saved, Trust, Why, judge
 from detent.record.evidence import now
-from detent.units import format_quantity
+from detent.units import format_place
 
 
 class MarkError(DiskError):
@@ -277,8 +277,8 @@ class Store:
         sensor = self.sensor
         low, high = sensor.reach or (-LARGEST - 1, LARGEST)
         if not low <= counts <= high:
-            said = f"{format_quantity(sensor.position(counts), sensor.unit, 6)} ({counts} counts)"
-            ends = " to ".join(format_quantity(sensor.position(one), sensor.unit, 6) for one in (low, high))
+            said = f"{format_place(sensor.position(counts), sensor.unit)} ({counts} counts)"
+            ends = " to ".join(format_place(sensor.position(one), sensor.unit) for one in (low, high))
             raise DetentError(f"{self.path}: got {said} for {what}; expected: {ends}; give a place within the travel")
 
     def _change_table(self, made: Iterable[Position], gone: Iterable[str] = ()) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from detent.methods.position import PositionSensor, Sensed
-from detent.units import format_quantity
+from detent.units import format_place, format_quantity
 
 
 class Trust(StrEnum):
@@ -71,10 +71,10 @@ class Judgement:
         """
         told = f"{self.trust}: {self.why}"
         if self.counts is not None:
-            return f"{told} ({format_quantity(sensor.position(self.counts), sensor.unit, 6)})"
+            return f"{told} ({format_place(sensor.position(self.counts), sensor.unit)})"
         if self.shown is None or self.distance is None:
             return told
-        shown = format_quantity(sensor.position(self.shown), sensor.unit, 6)
+        shown = format_place(sensor.position(self.shown), sensor.unit)
         distance = format_quantity(self.distance * sensor.scale, sensor.unit)
         return f"{told} (shown {shown}, {distance} from where it was left)"
 

@@ -10,7 +10,7 @@ from detent.control.axis_states import STATE_NAMES
 from detent.control.move_commands import lower_end, upper_end
 from detent.errors import REFUSAL_TEXT, AxisError, DetentError
 from detent.operate.loop import INJECT
-from detent.units import format_quantity, parse_quantity
+from detent.units import format_place, format_quantity, parse_quantity
 
 TRUSTS = ("unknown", "restored", "referenced")
 
@@ -226,7 +226,7 @@ def _end_of(q: Any, o: Any) -> str:
 
 def describe_status(status: dict[str, Any], unit: str) -> str:
     """One line for a terminal."""
-    place = format_quantity(status["position"], unit, 6)
+    place = format_place(status["position"], unit)
     moving = "" if status["rests"] else f", {format_quantity(status['velocity'], unit + '/s')}"
     stands = status["fault"]
     fault = f"; fault {stands['code']}: {stands['text'].partition('; ')[0]}" if stands else ""
