@@ -968,10 +968,11 @@ def test_28_four_faces_and_a_panel_show_the_same_sample(axis, plain):
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Faced]:
     """The example of a microscope stage, both motors, with its list of tiles beside its file."""
     pytest.importorskip("caproto")
+    pytest.importorskip("p4p")
     folder = tmp_path_factory.mktemp("stage")
     shutil.copy(detent.example("tiles.csv"), folder)
-    record = f"lab:stage@:{free_port()}"
-    with faced(folder, *LINES, "--epics", record, "--headless", example="stage.toml") as live:
+    records = [f"lab:stage@:{free_port()}" for _ in range(2)]
+    with faced(folder, *LINES, "--epics", records[0], "--pva", records[1], "--headless", example="stage.toml") as live:
         yield live
 
 
@@ -992,15 +993,18 @@ def test_30_a_stage_is_two_motors_of_epics_and_bluesky_visits_its_tiles(stage):
     visited(stage, "epics", "bluesky", "lab:stage", **environ)
 
 
+@pytest.mark.wide
 def test_30_a_stage_is_two_axes_of_grbl(stage):
     assert stage.started["faces"]["grbl"][1:] == ["X = x", "Y = y"]
     visited(stage, "grbl", "grbl", stage.place("grbl"))
 
 
+@pytest.mark.wide
 def test_30_a_stage_is_two_axes_of_gcs(stage):
     visited(stage, "pi", "gcs", stage.port("gcs"))
 
 
+@pytest.mark.wide
 def test_30_a_stage_is_two_axes_of_a_zaber_device(stage):
     with connected(stage, "x") as x, connected(stage, "y") as y:
         about = [one.link.describe() for one in (x, y)]
@@ -1040,6 +1044,7 @@ def test_30_a_stage_is_two_nodes_of_cia_402(stage):
 
 
 def test_30_a_stage_is_two_devices_and_instruments_everywhere_else(stage):
+    from p4p.client.thread import Context
     from pymodbus.client import ModbusTcpClient
 
     from detent.faces.modbus import signed
@@ -1056,6 +1061,9 @@ def test_30_a_stage_is_two_devices_and_instruments_everywhere_else(stage):
     counts = [signed(client.read_holding_registers(16, count=2, device_id=unit).registers) for unit in (1, 2)]
     client.close()
     assert counts == [11_200, 7_600]  # from the lower ends, -55 and -40 mm, in steps
+    words = dict(word.split("=") for word in stage.place("pva", 2).split())
+    with Context("pva", conf=words, useenv=False) as pva:
+        assert [float(pva.get(f"lab:stage:{motor}.RBV")) for motor in "xy"] == pytest.approx([1.0, -2.0])
     with socket.create_connection(("127.0.0.1", int(stage.port("scpi")))) as line:
         line.sendall(b"INST:CAT?\nINST:SEL?;POS?\nINST:SEL 'y';POS?\nINST:SEL z\nSYST:ERR?\n")
         answers = line.makefile("r")
