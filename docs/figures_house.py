@@ -88,13 +88,14 @@ def shown_step() -> tuple[list[str], list[str]]:
 def firmware() -> None:
     """A step above the function in C that is made of it."""
     python, c = shown_step()
+    size = 8.8 * min(1.0, 108 / max(map(len, python + c)))  # the longest line fits
     with figures.picture("firmware.png", 1, 0.19 * (len(python) + len(c)) + 0.5) as (axes,):
         y = 0.0
         for lines, colour in ((python, BLUE), (c, ORANGE)):
             axes.barh(y + 0.5 - len(lines) / 2, 0.006, left=-0.012, height=len(lines), color=colour)
             for line in lines:
                 y -= 1.0
-                axes.text(0.0, y + 0.5, line, family="monospace", fontsize=8.8, va="center", parse_math=False)
+                axes.text(0.0, y + 0.5, line, family="monospace", fontsize=size, va="center", parse_math=False)
             y -= 1.0
         axes.set_xlim(-0.02, 1.0)
         axes.set_ylim(y + 0.5, 0.5)
