@@ -15,7 +15,7 @@ from detent.kernel.registers import Registers, block, f8, f8_array, i1, i8, regi
 from detent.kernel.step import hot_step, step
 from detent.planning.speed_ramp import level_speed, passed, ramp, reach, way_to_rest, way_with_stop
 
-REST, GO, RUN, STOP = 0, 1, 2, 3  # modes
+REST, GO, RUN, STOP, LED = 0, 1, 2, 3, 4  # modes
 # What a command gives back; the texts stand in `errors.COURSE_REFUSAL_TEXT`.
 TAKEN, OUT_OF_RANGE, BEYOND_LIMIT, TOO_FAST, UNUSABLE_LIMITS = 0, 1, 2, 3, 4
 
@@ -43,7 +43,7 @@ class Course(Registers):
     position: f8 = register("commanded position", unit="m")
     velocity: f8 = register("commanded velocity", unit="m/s")
     acceleration: f8 = register("commanded acceleration", unit="m/s^2")
-    mode: u1 = register("0 at rest, 1 goes to a target, 2 runs at a velocity, 3 stops", unit="code")
+    mode: u1 = register("0 at rest, 1 goes to a target, 2 runs at a velocity, 3 stops, 4 is led", unit="code")
     target: f8 = register("target, of mode 1", unit="m")
     run: f8 = register("velocity asked for, of mode 2", unit="m/s")
     end: f8 = register("place where the plan ends, at rest", unit="m")
@@ -353,7 +353,7 @@ def lay_stretch(c: Course, t: float, x: float, v: float, a: float, j: float) -> 
 @step
 def advance(p: CourseLimits, c: Course, period: float) -> None:
     """One sample; `p` may be other limits than at the last one. A period that is no time is no sample."""
-    if c.mode == REST or not 0.0 < period <= LONGEST_PERIOD:
+    if c.mode in (REST, LED) or not 0.0 < period <= LONGEST_PERIOD:
         return
     if c.due or differs(p, c.asked):
         follow_limits(p, c)
@@ -375,6 +375,51 @@ def advance(p: CourseLimits, c: Course, period: float) -> None:
     c.position = max(min(x, c.top), c.bottom)
     c.velocity = v + t * (a + t * j / 2.0)
     c.acceleration = a + t * j
+
+
+@step
+def follow(p: CourseLimits, c: Course, target: float, velocity: float, acceleration: float, period: float) -> None:
+    """One sample of a course that is led from outside, to `target`, where it has this velocity and acceleration.
+
+    It goes no faster than allowed, and nowhere from where a stop would lead past a soft limit: near one it goes as
+    fast as it still can, and rests there.
+    """
+    if not is_usable(p) or not 0.0 < period <= LONGEST_PERIOD:
+        return
+    if c.mode != LED or differs(p, c.asked):
+        c.mode = REST  # no plan is under way that limits could run over
+        take_limits(p, c, -FARTHEST, FARTHEST)
+        c.mode = LED
+    wanted, most = target - c.position, p.speed * period
+    way = min(max(wanted, -most), most)
+    v, a = velocity, min(max(acceleration, -p.acceleration), p.acceleration)
+    if way != wanted or abs(v) > p.speed:
+        v, a = way / period, 0.0
+    if is_past(c.limits, c.position + way, v, a):
+        v, a = fastest(c.limits, c.position, way / period, period), 0.0
+        way = v * period
+    c.position += way
+    c.velocity, c.acceleration = v, a
+
+
+@step
+def is_past(f: CourseLimits, x: float, v: float, a: float) -> bool:
+    """True where a stop from here would lead past the soft limit ahead."""
+    rest = x + way_to_rest(f.acceleration, f.jerk, v, a)
+    return max(x, rest) > f.highest if v > 0.0 else min(x, rest) < f.lowest if v < 0.0 else False
+
+
+@step
+def fastest(f: CourseLimits, x: float, wanted: float, period: float) -> float:
+    """Velocity up to the one that is wanted after a sample of which a stop still ends at the soft limit."""
+    low, high = 0.0, wanted
+    for _ in range(HALVINGS):
+        v = low + (high - low) / 2.0
+        if is_past(f, x + v * period, v, 0.0):
+            high = v
+        else:
+            low = v
+    return low
 
 
 @step

@@ -12,6 +12,7 @@ from detent.control.homing import HALT as HALT_NOW
 from detent.control.homing import RUN as RUN_AT
 from detent.control.operation import (
     BEYOND,
+    FOLLOW,
     HALT,
     HOLD,
     HOME,
@@ -23,12 +24,16 @@ from detent.control.operation import (
     REST_OFF,
     RUN,
     SEEK,
+    STREAM_POSITION,
+    STREAM_VELOCITY,
     TRAVEL,
     Operation,
     OperationParams,
 )  # fmt: skip
 from detent.control.reaction import SOFT
 from detent.control.supervision import DISAGREE, SWINGS
+from detent.control.stream import POSITION, Stream
+from detent.errors import TOO_FAR
 from detent.kernel.loop import lay_ready, serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
@@ -41,7 +46,17 @@ from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.system import rest_off
 from detent.methods.method import Live
 from detent.methods.moves.legs import legs_of
-from detent.planning.course import Course, CourseLimits, advance, begin_at, come_to_rest, go_to, is_at_rest, run_at
+from detent.planning.course import (
+    Course,
+    CourseLimits,
+    advance,
+    begin_at,
+    come_to_rest,
+    follow,
+    go_to,
+    is_at_rest,
+    run_at,
+)
 from detent.sensing.position_sensor import PositionSensor, position_of, shift_positions
 
 
@@ -135,7 +150,20 @@ def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Ope
         why = run_at(memory.limits, memory.course, min(max(d.velocity, -top), top))
     elif d.do == HALT:
         come_to_rest(memory.limits, memory.course)
+    elif d.do == FOLLOW:
+        set_limits(q, c, memory, o)
+        if o.stream.quantity == POSITION and abs(o.stream.slope) > memory.limits.speed:
+            return TOO_FAR
     return BEYOND if why else 0
+
+
+@step
+def go_along(memory: CascadeLive, s: Stream, period: float) -> None:
+    """One sample along a stream of positions or velocities."""
+    if s.quantity == POSITION:
+        follow(memory.limits, memory.course, s.value, s.slope, s.bend, period)
+    else:
+        follow(memory.limits, memory.course, memory.course.position + s.value * period, s.value, s.slope, period)
 
 
 @serves(CascadeLiveParams)
@@ -156,7 +184,10 @@ def serve(  # noqa: PLR0913 - as all of its kind
     c.known = 0 if o.trust == NOT_KNOWN else 1
     if c.on == 0 or before == 0:  # the commanded point is where the axis is
         begin_at(course, here.position)
-    advance(memory.limits, course, p.law.period)
+    if o.demand.do == FOLLOW and a.refused == 0:
+        go_along(memory, o.stream, p.law.period)
+    else:
+        advance(memory.limits, course, p.law.period)
     c.reference.position, c.reference.velocity = course.position, course.velocity
     c.reference.acceleration = course.acceleration
     a.position, a.velocity = here.position, here.velocity
@@ -186,7 +217,7 @@ def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Liv
     q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
     q.settled = host.params.controller.limits.window
     ends = spec.limits.lowest, spec.highest
-    motions = (MOVE_TO, MOVE_BY, JOG) if spec.home is None else (MOVE_TO, MOVE_BY, JOG, HOME)
+    motions = MOVE_TO, MOVE_BY, JOG, STREAM_POSITION, STREAM_VELOCITY, *(() if spec.home is None else (HOME,))
     q.operation = operation(host.period, host.params.controller.limits.arrival * host.period, ends, *motions)
     if spec.home is not None:
         q.homing = homing_params(spec, spec.home)
