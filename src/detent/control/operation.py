@@ -325,7 +325,8 @@ def judge(q: OperationParams, o: Operation) -> None:
     a, d = o.answer, o.demand
     was_led = a.refused != 0 and o.kind in STREAMS
     if a.refused:  # in the look in which it was told, or later: a controller may need time to find out
-        end_running(o, FAILED if o.kind == JOB and q.performs else REFUSED, a.refused, 0)
+        failed = (o.kind == JOB and q.performs) or (was_led and d.fresh == 0)
+        end_running(o, FAILED if failed else REFUSED, a.refused, 0)
     d.fresh = d.edited = 0
     if was_led:
         halt(o)

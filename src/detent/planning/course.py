@@ -386,20 +386,36 @@ def follow(p: CourseLimits, c: Course, target: float, velocity: float, accelerat
     """
     if not is_usable(p) or not 0.0 < period <= LONGEST_PERIOD:
         return
+    begin_to_be_led(p, c)
+    x, way, most = target, target - c.position, p.speed * period
+    room = ROUNDING * (abs(target) + most)
+    v, a = velocity, min(max(acceleration, -p.acceleration), p.acceleration)
+    if abs(way) > most + room or abs(v) * period > most + room:
+        way = min(max(way, -most), most)
+        x, v, a = c.position + way, way / period, 0.0
+    if is_past(c.limits, x, v, a):
+        v, a = fastest(c.limits, c.position, way / period, period), 0.0
+        x = c.position + v * period
+    c.position, c.velocity, c.acceleration = x, v, a
+
+
+@step
+def begin_to_be_led(p: CourseLimits, c: Course) -> None:
+    """No plan is under way any more that limits could run over."""
     if c.mode != LED or differs(p, c.asked):
-        c.mode = REST  # no plan is under way that limits could run over
+        c.mode = REST
         take_limits(p, c, -FARTHEST, FARTHEST)
         c.mode = LED
-    wanted, most = target - c.position, p.speed * period
-    way = min(max(wanted, -most), most)
-    v, a = velocity, min(max(acceleration, -p.acceleration), p.acceleration)
-    if way != wanted or abs(v) > p.speed:
-        v, a = way / period, 0.0
-    if is_past(c.limits, c.position + way, v, a):
-        v, a = fastest(c.limits, c.position, way / period, period), 0.0
-        way = v * period
-    c.position += way
-    c.velocity, c.acceleration = v, a
+
+
+@step
+def drift(p: CourseLimits, c: Course, position: float, velocity: float) -> bool:
+    """One sample of a course that is where the axis is; False where that goes too fast, or a stop comes too late."""
+    if not is_usable(p) or not -FARTHEST <= position <= FARTHEST:
+        return False
+    begin_to_be_led(p, c)
+    c.position, c.velocity, c.acceleration = position, min(max(velocity, -p.speed), p.speed), 0.0
+    return abs(velocity) <= p.speed and not is_past(c.limits, position, velocity, 0.0)
 
 
 @step

@@ -24,21 +24,28 @@ from detent.control.operation import (
     REST_OFF,
     RUN,
     SEEK,
-    STREAM_POSITION,
-    STREAM_VELOCITY,
+    STREAMS,
     TRAVEL,
     Operation,
     OperationParams,
 )  # fmt: skip
 from detent.control.reaction import SOFT
 from detent.control.supervision import DISAGREE, SWINGS
-from detent.control.stream import POSITION, Stream
-from detent.errors import TOO_FAR
+from detent.control.stream import EFFORT, POSITION, Stream
+from detent.errors import DRIVEN_OFF, TOO_FAR
 from detent.kernel.loop import lay_ready, serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
 from detent.methods.cascade.build import homing_params, motion_limits
-from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines, engage
+from detent.methods.cascade.controller import (
+    OPEN,
+    CascadeController,
+    CascadeControllerParams,
+    CascadeLines,
+    close_loops,
+    engage,
+    open_loops,
+)
 from detent.methods.cascade.faults import places
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.run import describe_cause
@@ -52,6 +59,7 @@ from detent.planning.course import (
     advance,
     begin_at,
     come_to_rest,
+    drift,
     follow,
     go_to,
     is_at_rest,
@@ -137,6 +145,8 @@ def search(  # noqa: PLR0913 - as `serve`, and where the axis is
 def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Operation) -> int:
     """What is freshly demanded; gives a reason to refuse it, 0 for none."""
     d, why = o.demand, 0
+    if c.on == OPEN and not (d.do == FOLLOW and o.stream.quantity == EFFORT):
+        close_loops(c)
     if d.do == REST_OFF:
         c.on = 0
     elif d.do == HOLD:
@@ -158,12 +168,20 @@ def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Ope
 
 
 @step
-def go_along(memory: CascadeLive, s: Stream, period: float) -> None:
-    """One sample along a stream of positions or velocities."""
+def go_along(  # noqa: PLR0913 - as `serve`, and where the axis is
+    p: CascadeControllerParams, c: CascadeController, memory: CascadeLive, here: PositionSensor, s: Stream
+) -> int:  # fmt: skip
+    """One sample along a stream; gives why it goes on no longer, 0 while it does."""
+    limits, course, period = memory.limits, memory.course, p.law.period
     if s.quantity == POSITION:
-        follow(memory.limits, memory.course, s.value, s.slope, s.bend, period)
+        follow(limits, course, s.value, s.slope, s.bend, period)
+    elif s.quantity != EFFORT:
+        follow(limits, course, course.position + s.value * period, s.value, s.slope, period)
+    elif drift(limits, course, here.position, here.velocity):
+        open_loops(c, min(max(s.value, -1.0), 1.0) * p.law.max_command)
     else:
-        follow(memory.limits, memory.course, memory.course.position + s.value * period, s.value, s.slope, period)
+        return DRIVEN_OFF
+    return 0
 
 
 @serves(CascadeLiveParams)
@@ -185,7 +203,7 @@ def serve(  # noqa: PLR0913 - as all of its kind
     if c.on == 0 or before == 0:  # the commanded point is where the axis is
         begin_at(course, here.position)
     if o.demand.do == FOLLOW and a.refused == 0:
-        go_along(memory, o.stream, p.law.period)
+        a.refused = go_along(p, c, memory, here, o.stream)
     else:
         advance(memory.limits, course, p.law.period)
     c.reference.position, c.reference.velocity = course.position, course.velocity
@@ -217,7 +235,7 @@ def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Liv
     q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
     q.settled = host.params.controller.limits.window
     ends = spec.limits.lowest, spec.highest
-    motions = MOVE_TO, MOVE_BY, JOG, STREAM_POSITION, STREAM_VELOCITY, *(() if spec.home is None else (HOME,))
+    motions = MOVE_TO, MOVE_BY, JOG, *STREAMS, *(() if spec.home is None else (HOME,))
     q.operation = operation(host.period, host.params.controller.limits.arrival * host.period, ends, *motions)
     if spec.home is not None:
         q.homing = homing_params(spec, spec.home)
