@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tests.face_rig import drive_on_virtual
 
 import detent
 from detent.methods.cascade.host import CascadeHost
@@ -18,6 +17,7 @@ from detent.operate.channel import Channel
 from detent.operate.session import Session
 from detent.operate.start import make_host
 from detent.planning.profile import Profile
+from tests.face_rig import drive_on_virtual
 
 NODE = 5
 PATIENCE = 20.0  # of who waits for another thread [s]
@@ -37,7 +37,7 @@ class Stepped:
 
     def step(self, periods: int = 1) -> None:
         """Let periods pass; nobody else takes note meanwhile."""
-        with self.session._lock:  # noqa: SLF001 - a loop in wall time has a thread for it
+        with self.session._lock:
             self.host.run(periods)
 
     @contextmanager
@@ -81,6 +81,7 @@ def stepped(folder: Path, *overrides: str) -> Iterator[Stepped]:
 def master_of(axis: Stepped, bus: str) -> Iterator[tuple[Any, Any]]:
     """A node of canopen's master, operational, and its network."""
     from canopen.profiles.p402 import BaseNode402
+
     from tests.clients.p402 import patient
 
     with drive_on_virtual(axis, bus) as (_, network, sheet):  # pyright: ignore[reportArgumentType]
@@ -98,18 +99,23 @@ class Cycle:
     def __init__(self, axis: Stepped, node: Any, network: Any) -> None:
         self._axis, self._node, self._network = axis, node, network
 
-    def __call__(self, target: int, name: str = "Target position") -> None:
-        """One period, from the target to its end in the axis."""
-        asked, rpdo = int(self._axis.host.board.inbox.written), self._node.rpdo[1]
-        rpdo["Controlword"].raw, rpdo[name].raw = 0x0F, target
-        rpdo.transmit()
+    def __call__(self, target: int) -> None:
+        """One period of positions."""
+        rpdo = self._node.rpdo[1]
+        rpdo["Controlword"].raw, rpdo["Target position"].raw = 0x0F, target
+        self.sent(rpdo.transmit)
+
+    def sent(self, send: Callable[[], object]) -> None:
+        """One period, from what is sent in it to its end in the axis."""
+        asked = int(self._axis.host.board.inbox.written)
+        send()
         self._network.sync.transmit()
         self._axis.until(lambda: self._axis.host.board.inbox.written > asked)
         self._axis.step()
 
 
 def between(points: NDArray[np.float64], start: float, period: float, samples: int) -> Profile:
-    """The same set-points as a reference of `detent run`: straight lines, so many samples each, worked out here anew."""
+    """The same set-points as a reference of `detent run`: straight lines of so many samples, worked out here anew."""
     ends = np.concatenate([[start], points])
     slope = np.diff(ends) / period
     bend = np.diff(slope, prepend=slope[0]) / period

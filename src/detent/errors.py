@@ -193,8 +193,8 @@ REFUSAL_TEXT: dict[int, str] = {
     111: "the axis moves, and where it is cannot be taught; wait until it rests, or stop it",
     112: "there is no change of the position table left to take back, or to make again; look at the table",
     113: "the first set-point lies farther away than the axis goes in an interpolation period; begin where it stands",
-    114: "the effort drove the axis to its largest speed, or to where it could just stop before a soft limit, and it was "
-    "brought to rest; ask for less, and sooner for the other way",
+    114: "the effort drove the axis to its largest speed, or to where it could just stop before a soft limit, and it "
+    "was brought to rest; ask for less, and sooner for the other way",
     201: "the table was still moving; wait until it stands, or stop it",
     202: "the position table has no such number; name one that it has, or add it to the axis file",
     203: "the way is longer than the remaining angle can count; name a nearer position",

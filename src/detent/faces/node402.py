@@ -246,23 +246,25 @@ class Node:
         }.get(index)  # fmt: skip
         return None if shown is None else shown()
 
-    def _written(self, *, index: int, subindex: int, data: bytes, **_: Any) -> None:
-        """Objects that act when they are written; called in the thread of the bus."""
-        value = int.from_bytes(data, "little", signed=index in (c.MODE, 0x607D, c.ABORT, c.TORQUE, c.PLACE))
-        if index == c.MODE:
-            if value < 0 or (value and not (SUPPORTED | supported(self.axis)) >> (value - 1) & 1):
-                raise canopen.SdoAbortedError(OTHER_VALUE)
-            self._loop.call_soon_threadsafe(self._choose, value)
-        elif index == 0x6081 and not 0 < value <= round(self.axis.speed / self.axis.count):
+    def _refuse(self, index: int, part: int, value: int) -> None:
+        """What the drive does not do."""
+        if index == c.MODE and (value < 0 or (value and not (SUPPORTED | supported(self.axis)) >> (value - 1) & 1)):
+            raise canopen.SdoAbortedError(OTHER_VALUE)
+        if index == 0x6081 and not 0 < value <= round(self.axis.speed / self.axis.count):
             raise canopen.SdoAbortedError(TOO_LARGE if value else OTHER_VALUE)
-        elif index == 0x607D and self.axis.limits:
+        if index == 0x607D and self.axis.limits:
             low, high = map(self.axis.to_counts, self.axis.limits)
             if not low <= value <= high:
                 raise canopen.SdoAbortedError(TOO_LARGE if value > high else 0x06090032)
-        elif index == c.ABORT and value not in (0, 1, 2, 3):
+        if (index == c.ABORT and value not in (0, 1, 2, 3)) or (index == c.CYCLE and part == 1 and not value):
             raise canopen.SdoAbortedError(OTHER_VALUE)
-        elif index == c.CYCLE and subindex == 1 and not value:
-            raise canopen.SdoAbortedError(OTHER_VALUE)
+
+    def _written(self, *, index: int, subindex: int, data: bytes, **_: Any) -> None:
+        """Objects that act when they are written; called in the thread of the bus."""
+        value = int.from_bytes(data, "little", signed=index in (c.MODE, 0x607D, c.ABORT, c.TORQUE, c.PLACE))
+        self._refuse(index, subindex, value)
+        if index == c.MODE:
+            self._loop.call_soon_threadsafe(self._choose, value)
         elif index == c.CONSUMER and subindex:
             self._limit, self._master, self._heard = (value & 0xFFFF) * 1e-3, value >> 16 & 0x7F, time.monotonic()
             self.node.network.subscribe(HEARTBEAT + self._master, self._beat)
@@ -273,7 +275,7 @@ class Node:
         elif index == c.VELOCITY:
             self._velocity = int.from_bytes(data, "little", signed=True)  # what is stored is not yet that
             self.cyclic.write(index, self._velocity)
-            if self._mode == VELOCITY:
+            if not self.cyclic.follows:
                 self._loop.call_soon_threadsafe(self._words.put_nowait, None)
         elif index == c.CONTROL:
             same, self._asked = value == self._asked, value

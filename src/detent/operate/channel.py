@@ -254,7 +254,7 @@ class Channel:
         return command
 
     def _points(
-        self, client: Client, stream: object = 0, values: object = (), in_turn: object = False, last: object = False
+        self, client: Client, stream: object = 0, values: object = (), *, in_turn: object = False, last: object = False
     ) -> int:
         """Set-points of a stream; no command, so that nothing of them stands in the log."""
         return self.session.points(stream, values, client=client.number, in_turn=in_turn, last=last)

@@ -30,8 +30,8 @@ from detent.control.operation import (
     OperationParams,
 )  # fmt: skip
 from detent.control.reaction import SOFT
-from detent.control.supervision import DISAGREE, SWINGS
 from detent.control.stream import EFFORT, POSITION, Stream
+from detent.control.supervision import DISAGREE, SWINGS
 from detent.errors import DRIVEN_OFF, TOO_FAR
 from detent.kernel.loop import lay_ready, serves
 from detent.kernel.registers import Registers, block, f8, i8, register
@@ -168,7 +168,7 @@ def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Ope
 
 
 @step
-def go_along(  # noqa: PLR0913 - as `serve`, and where the axis is
+def go_along(
     p: CascadeControllerParams, c: CascadeController, memory: CascadeLive, here: PositionSensor, s: Stream
 ) -> int:  # fmt: skip
     """One sample along a stream; gives why it goes on no longer, 0 while it does."""
