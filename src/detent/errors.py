@@ -155,6 +155,7 @@ DRIVE_FAULT, DRIVE_LOST, LOOP_OVERRUN, LOOP_DEAD, BROKEN, OTHER_HARDWARE = 24, 4
 SENSOR_LOST, OVER_CURRENT, MOTOR_LOAD = 1, 20, 21  # a drive has found them; of 1 and 21 a guard may know, too
 NO_MARK = 55  # refusal of a motion that a power cut would make a riddle of
 NOT_AT_REST, NOTHING_TO_UNDO = 111, 112  # refusals of what is asked of a position table
+TOO_FAR, DRIVEN_OFF = 113, 114  # why a stream of set-points does not begin, or does not go on
 
 REFUSAL_TEXT: dict[int, str] = {
     1: "the encoder is not heard; check its cable and supply, reset, and find the reference anew",
@@ -166,7 +167,7 @@ REFUSAL_TEXT: dict[int, str] = {
     31: "the target lies beyond a soft limit; name one between the limits",
     35: "the position is not known, so that only creeping by a way or by hand is allowed; home the axis",
     40: "nothing is heard from the drive for three periods of its heartbeat; check cable, supply and bus, then reset",
-    41: "whoever held the jog, or led the job, was silent for longer than its lease; begin it again",
+    41: "whoever held the jog, led the job, or sent the set-points was silent for too long; begin it again",
     43: "somebody else commands; take over first, or ask them",
     44: "a stop came after this was asked; look at the axis and ask again",
     50: "the loop came too late, for more than 5 periods or more than 3 times in a second, and the axis was stopped; "
@@ -191,6 +192,9 @@ REFUSAL_TEXT: dict[int, str] = {
     110: "the first motion since enabling has not been confirmed, and a job goes at speeds of its own; confirm first",
     111: "the axis moves, and where it is cannot be taught; wait until it rests, or stop it",
     112: "there is no change of the position table left to take back, or to make again; look at the table",
+    113: "the first set-point lies farther away than the axis goes in an interpolation period; begin where it stands",
+    114: "the effort drove the axis to its largest speed, or to where it could just stop before a soft limit, and it "
+    "was brought to rest; ask for less, and sooner for the other way",
     201: "the table was still moving; wait until it stands, or stop it",
     202: "the position table has no such number; name one that it has, or add it to the axis file",
     203: "the way is longer than the remaining angle can count; name a nearer position",

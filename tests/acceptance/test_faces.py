@@ -692,7 +692,8 @@ TABLE = """
 6064 0 i32 ro *|6065 0 u32 ro FFFFFFFF|6066 0 u16 ro 0|6067 0 u32 ro FFFFFFFF|6068 0 u16 ro 0|606C 0 i32 ro *
 6077 0 i16 ro *|607A 0 i32 rw 0|607D 1 i32 rw 0|607D 2 i32 rw 7A120|607F 0 u32 ro 7A120|6081 0 u32 rw 7A120
 6083 0 u32 ro 4C4B40|6084 0 u32 ro 4C4B40|6085 0 u32 ro 4C4B40|6098 0 i8 ro -1|60F4 0 i32 ro *|60FF 0 i32 rw 0
-6502 0 u32 ro 25|1400 1 u32 rw 205|1401 1 u32 rw 305|1800 1 u32 rw 185|1801 1 u32 rw 285|1801 5 u16 ro 14
+6502 0 u32 ro 3A5|6071 0 i16 rw 0|60C2 1 u8 rw 1|60C2 2 i8 rw -2
+1400 1 u32 rw 205|1401 1 u32 rw 305|1800 1 u32 rw 185|1801 1 u32 rw 285|1801 5 u16 ro 14
 1600 1 u32 rw 60400010
 1600 2 u32 rw 607A0020|1601 1 u32 rw 60600008|1A00 1 u32 rw 60410010|1A00 2 u32 rw 60640020|1A01 2 u32 rw 606C0020
 2000 1 u32 ro *|2000 2 i32 ro *|2000 3 u8 ro 2|2000 4 u16 ro 0
@@ -721,10 +722,11 @@ def test_18_objects(still):
             read_only = [0x06010002, 0x06010002]
             assert codes == (read_only if access == "ro" else [0x06070010]), (index_, codes)
         for index, part, value, code in (
-            (0x5FFF, 0, 1, 0x06020000), (0x1018, 9, 1, 0x06090011), (0x6060, 0, 8, 0x06090030),
+            (0x5FFF, 0, 1, 0x06020000), (0x1018, 9, 1, 0x06090011), (0x6060, 0, 7, 0x06090030),
+            (0x60C2, 1, 0, 0x06090030),
             (0x607D, 2, 500_001, 0x06090031), (0x6081, 0, 500_001, 0x06090031), (0x6007, 0, 9, 0x06090030),
         ):  # fmt: skip
-            size = {0x6060: 1, 0x6007: 2}.get(index, 4)
+            size = {0x6060: 1, 0x60C2: 1, 0x6007: 2}.get(index, 4)
             with pytest.raises(canopen.SdoAbortedError) as refused:
                 node.sdo.download(index, part, value.to_bytes(size, "little"))
             assert refused.value.code == code, hex(index)

@@ -13,7 +13,7 @@ from detent.control.axis_states import (
     SWITCHED_ON,
     ordered,
 )
-from detent.control.move_commands import begin_motion, can_move_end, move_end, why_not_move
+from detent.control.move_commands import begin_motion, can_move_end, move_end, take_set_point, why_not_move
 from detent.control.operation import (
     ABORTED,
     BEYOND,
@@ -28,6 +28,7 @@ from detent.control.operation import (
     JOB,
     JOG,
     KEEP,
+    LAST_POINT,
     LEAVE,
     LOWER,
     MOVE_BY,
@@ -41,12 +42,14 @@ from detent.control.operation import (
     OFF,
     ORDER,
     PAUSE,
+    POINTS,
     REFUSED,
     RESET,
     RESUME,
     SECOND,
     STALE,
     STOP,
+    STREAMS,
     TAKE,
     TRUST,
     UNKNOWN,
@@ -89,10 +92,13 @@ def obey(q: OperationParams, o: Operation, r: Request) -> None:
         off(o, r.id)
         end(o, r.id, DONE, 0, 0)
         return
+    if r.kind in POINTS:
+        take_set_point(o, r)
+        return
     why = why_not(q, o, r)
     if why:
         end(o, r.id, REFUSED, why, 0)
-    elif r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, JOB):
+    elif r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, JOB) or r.kind in STREAMS:
         begin_motion(q, o, r)
     else:
         manage(q, o, r)
@@ -106,7 +112,7 @@ def obey(q: OperationParams, o: Operation, r: Request) -> None:
 @step
 def why_not(q: OperationParams, o: Operation, r: Request) -> int:
     """Reason to refuse a request, 0 for none; stop and off are never refused."""
-    if not (1 <= r.kind <= RESUME) or r.id < NEEDS_ID:
+    if not (1 <= r.kind <= LAST_POINT) or r.id < NEEDS_ID:
         return UNKNOWN
     if not (abs(r.value) < 1e12 and 0.0 < r.speed <= 1.0):  # neither infinite nor no number
         return NOT_FINITE
@@ -126,7 +132,7 @@ def why_not(q: OperationParams, o: Operation, r: Request) -> int:
 @step
 def why_not_now(q: OperationParams, o: Operation, r: Request) -> int:
     """Reason to refuse a request of an axis without a fault, 0 for none."""
-    if r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, CONFIRM, JOB):
+    if r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, CONFIRM, JOB) or r.kind in STREAMS:
         return why_not_move(q, o, r)
     if r.kind in (LOWER, UPPER):
         return 0 if can_move_end(q, o, r) else BEYOND

@@ -10,15 +10,21 @@ from detent.control.operation import (
     HOME,
     JOB,
     JOG,
+    LAST_POINT,
     LOWER,
     MOVE_BY,
     MOVE_TO,
     NOT_CONFIRMED,
     NOT_ENABLED,
+    NOT_FINITE,
     NOT_KNOWN,
     NUMBERED,
+    POINT,
     RUN,
     SEEK,
+    STREAM_POSITION,
+    STREAM_VELOCITY,
+    STREAMS,
     TRAVEL,
     UNREFERENCED,
     WORK,
@@ -29,7 +35,10 @@ from detent.control.operation import (
     halt,
     tell,
 )
+from detent.control.stream import open_stream, point_in_turn, point_now
 from detent.kernel.step import hot_step, step
+
+LONGEST_PERIOD = 1.0  # of a stream's interpolation [s]
 
 
 @step
@@ -39,12 +48,14 @@ def why_not_move(q: OperationParams, o: Operation, r: Request) -> int:
         return NOT_ENABLED
     if q.one_at_a_time and o.running and r.kind != CONFIRM:
         return BUSY
-    if o.trust == NOT_KNOWN and r.kind in (MOVE_TO, GO, JOB):
+    if o.trust == NOT_KNOWN and (r.kind in (MOVE_TO, GO, JOB) or (r.kind in STREAMS and r.kind != STREAM_VELOCITY)):
         return UNREFERENCED
     if r.kind == JOB and q.careful and not (o.confirmed or q.performs):  # it goes at speeds of its own
         return NOT_CONFIRMED
     if r.kind in (MOVE_TO, MOVE_BY) and not is_allowed(q, o, goal(o, r)):
         return BEYOND
+    if r.kind in STREAMS and not 0.5 * q.look < r.value <= LONGEST_PERIOD:
+        return NOT_FINITE
     return 0
 
 
@@ -101,6 +112,11 @@ def begin_motion(q: OperationParams, o: Operation, r: Request) -> None:
         tell(o, NUMBERED)
     elif r.kind == HOME:
         tell(o, SEEK)
+    elif r.kind in STREAMS:
+        looks = max(1, round(r.value / q.look))
+        open_stream(o.stream, r.kind - STREAM_POSITION + 1, looks, looks * q.look)
+        if o.answer.rests == 0:
+            halt(o)
     elif r.kind == JOB:
         d.number, d.laid = round(r.value), 0
         o.lease = q.job_looks
@@ -111,6 +127,21 @@ def begin_motion(q: OperationParams, o: Operation, r: Request) -> None:
     else:
         d.target = goal(o, r)
         tell(o, TRAVEL)
+
+
+@step
+def take_set_point(o: Operation, r: Request) -> None:
+    """A set-point of the stream that is under way; one of another, or that is no number, is dropped and counted."""
+    s = o.stream
+    if o.kind not in STREAMS or r.id != o.running or r.client != o.client or not abs(r.value) < 1e12:
+        s.dropped += 1
+        return
+    here = o.answer.commanded if o.kind == STREAM_POSITION else 0.0
+    here = o.answer.commanded_velocity if o.kind == STREAM_VELOCITY else here
+    if r.kind == POINT:
+        point_now(s, r.value, here)
+    elif not point_in_turn(s, r.value, here, 1 if r.kind == LAST_POINT else 0):
+        s.dropped += 1
 
 
 @hot_step

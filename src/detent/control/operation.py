@@ -22,18 +22,22 @@ from detent.control.axis_states import (
     ordered,
 )
 from detent.control.reaction import DOUBTS, IN_MOTION, LETS_GO, LOSES, is_among
+from detent.control.stream import CLOSED, POSITION, VELOCITY, Stream, advance_stream, is_lost
 from detent.kernel.registers import Registers, block, f8, i2_array, i8, i8_array, register, u1, u1_array, u2
 from detent.kernel.step import hot_step, step
 
 # ---- what may be asked
 (
     ENABLE, OFF, STOP, RESET, MOVE_TO, MOVE_BY, JOG, GO, HOME, KEEP, CONFIRM, TAKE, ORDER, TRUST, LEAVE, JOB, FEED,
-    LOWER, UPPER, PAUSE, RESUME,
-) = COMMANDS = tuple(range(1, 22))  # fmt: skip
+    LOWER, UPPER, PAUSE, RESUME, STREAM_POSITION, STREAM_VELOCITY, STREAM_EFFORT, POINT, POINT_IN_TURN, LAST_POINT,
+) = COMMANDS = tuple(range(1, 28))  # fmt: skip
 COMMAND_NAMES = (
     "enable", "off", "stop", "reset", "move to", "move by", "jog", "go", "home", "keep", "confirm", "take", "order",
-    "trust", "leave", "job", "feed", "lower end", "upper end", "pause", "resume",
+    "trust", "leave", "job", "feed", "lower end", "upper end", "pause", "resume", "stream position", "stream velocity",
+    "stream effort", "point", "point in turn", "last point",
 )  # fmt: skip
+STREAMS = STREAM_POSITION, STREAM_VELOCITY, STREAM_EFFORT
+POINTS = POINT, POINT_IN_TURN, LAST_POINT  # parts of a stream, under its id: they have no ending of their own
 MANAGED = ENABLE, OFF, STOP, RESET, KEEP, CONFIRM, TAKE, ORDER, TRUST, LEAVE  # of every method; the others move it
 NEEDS_ID = 1  # smallest id of a command; 0 is none
 
@@ -49,7 +53,7 @@ NOT_SETTLED, BEYOND, UNREFERENCED, LEASE_LOST, SECOND, STALE, NOT_FINITE = 13, 3
 NOT_KNOWN, RESTORED, REFERENCED = range(3)
 
 # ---- what the method's controller is told to do
-REST_OFF, HOLD, TRAVEL, RUN, HALT, SEEK, NUMBERED, WORK = range(8)
+REST_OFF, HOLD, TRAVEL, RUN, HALT, SEEK, NUMBERED, WORK, FOLLOW = range(9)
 
 ENDS = 256  # endings that are kept until the host has read them
 
@@ -70,6 +74,7 @@ class Request(Registers):
 class OperationParams(Registers):
     """Times and rules."""
 
+    look: f8 = register("time between two looks", unit="s")
     window_looks: i8 = register("looks inside the window until a command is done", unit="count")
     lease_looks: i8 = register("looks that a jog lives without being kept", unit="count")
     job_looks: i8 = register("looks that a job lives without being kept", unit="count")
@@ -158,6 +163,7 @@ class Operation(Registers):
     barred: u2 = register("why the axis may not be enabled, whatever its method says; 0 it may", unit="code")
     demand: Demand = block("what the method is told")
     answer: Answer = block("what it says")
+    stream: Stream = block("set-points that the method follows")
     endings: Endings = block("how commands ended")
 
 
@@ -293,15 +299,37 @@ def look(o: Operation) -> None:
         if o.lease == 0:
             end_running(o, FAILED, LEASE_LOST, 0)
             halt(o)
+    if o.kind in STREAMS:
+        lead_along(o)
+
+
+@step
+def lead_along(o: Operation) -> None:
+    """One look of a stream: its reference is followed from the first set-point on, to the last one, or to its loss."""
+    s, a = o.stream, o.answer
+    here = a.commanded if s.quantity == POSITION else (a.commanded_velocity if s.quantity == VELOCITY else s.value)
+    advance_stream(s, here)
+    if is_lost(s):
+        end_running(o, FAILED, LEASE_LOST, 0)
+        halt(o)
+    elif s.fresh:
+        tell(o, FOLLOW)
+    elif s.closing == CLOSED and o.demand.do == FOLLOW:
+        halt(o)
+    s.fresh = 0
 
 
 @step
 def judge(q: OperationParams, o: Operation) -> None:
     """After the method has answered: did it take the demand, and is the command done."""
     a, d = o.answer, o.demand
+    was_led = a.refused != 0 and o.kind in STREAMS
     if a.refused:  # in the look in which it was told, or later: a controller may need time to find out
-        end_running(o, FAILED if o.kind == JOB and q.performs else REFUSED, a.refused, 0)
+        failed = (o.kind == JOB and q.performs) or (was_led and d.fresh == 0)
+        end_running(o, FAILED if failed else REFUSED, a.refused, 0)
     d.fresh = d.edited = 0
+    if was_led:
+        halt(o)
     if a.soft:
         fail_softly(o, a.soft)
     if not a.rests:
@@ -312,7 +340,8 @@ def judge(q: OperationParams, o: Operation) -> None:
         o.last_stop = abs(a.commanded - o.stop_from)
     if o.kind == STOP:
         end_running(o, DONE, 0, 0)
-    if o.running and o.kind != ENABLE and not (o.kind == JOG and d.velocity != 0.0):
+    streams = o.kind in STREAMS and o.stream.closing != CLOSED
+    if o.running and o.kind != ENABLE and not streams and not (o.kind == JOG and d.velocity != 0.0):
         o.within = o.within + 1 if a.near else 0
         o.outside = 0 if a.near else o.outside + 1
         if o.within >= q.window_looks and not (o.kind == JOB and q.performs):  # there its moves are done one by one

@@ -1,4 +1,4 @@
-"""The live axis as a CiA 402 drive on a CAN bus: profile position, profile velocity and homing.
+"""The live axis as a CiA 402 drive on a CAN bus: profile position and velocity, homing, and what follows a master.
 
 Its states are those of the axis; positions are counts of the sensor, velocities counts per second. The bus is served by
 a thread of python-can; what it writes is done in the order in which it came, in the loop of the face.
@@ -15,6 +15,7 @@ from canopen.objectdictionary.datatypes import INTEGER8, INTEGER16, INTEGER32, U
 
 from detent.control.axis_states import ENABLED, FAULT, HALT_QUICKLY, QUICK_STOP, STATE_NAMES, ordered
 from detent.errors import DetentError
+from detent.faces.cyclic import MODES, Cyclic, cycle, supported
 from detent.faces.service import LEASE_LOST, AxisService, Desk, NotDoneError
 from detent.faces.set_points import HALT, SetPoints
 from detent.operate.drivers import cia402 as c
@@ -61,7 +62,8 @@ def objects_of(axis: AxisService) -> tuple[c.Entry, ...]:
         e(0x6084, "Profile deceleration", UNSIGNED32, "ro", ramp),
         e(0x6085, "Quick stop deceleration", UNSIGNED32, "ro", ramp),
         e(0x6098, "Homing method", INTEGER8, "ro", -1), e(0x60F4, "Following error actual value", INTEGER32, "ro"),
-        e(c.VELOCITY, "Target velocity", INTEGER32), e(c.MODES, "Supported drive modes", UNSIGNED32, "ro", SUPPORTED),
+        e(c.TORQUE, "Target torque", INTEGER16), e(c.VELOCITY, "Target velocity", INTEGER32),
+        e(c.MODES, "Supported drive modes", UNSIGNED32, "ro", SUPPORTED | supported(axis)),
     )
     # fmt: on
 
@@ -89,7 +91,7 @@ def records_of(axis: AxisService, node: int) -> dict[tuple[int, str], tuple[c.En
             ),
         }  # fmt: skip
 
-    control, status = c.CONTROL << 16 | 16, c.STATUS << 16 | 16
+    control, status, (value, power) = c.CONTROL << 16 | 16, c.STATUS << 16 | 16, cycle(axis)
     return {
         (c.CONSUMER, "Consumer heartbeat time"): (e(1, "Master", UNSIGNED32),),
         (c.IDENTITY, "Identity object"): (
@@ -103,6 +105,9 @@ def records_of(axis: AxisService, node: int) -> dict[tuple[int, str], tuple[c.En
         (0x607D, "Software position limit"): (
             e(1, "Min position limit", INTEGER32, "rw", axis.to_counts(low)),
             e(2, "Max position limit", INTEGER32, "rw", axis.to_counts(high)),
+        ),
+        (c.CYCLE, "Interpolation time period"): (
+            e(1, "Interpolation period", UNSIGNED8, "rw", value), e(2, "Power of ten", INTEGER8, "rw", power),
         ),
         **process_data("RPDO", 1, control, c.PLACE << 16 | 32),
         **process_data("RPDO", 2, c.MODE << 16 | 8, c.VELOCITY << 16 | 32),
@@ -121,7 +126,8 @@ class Node:
         for parts in (maps[place] for place in (0x1600, 0x1601, 0x1A00, 0x1A01)):
             parts[0].default = sum(1 for k in range(1, 5) if parts[k].default)
         self.node: Any = canopen.LocalNode(node, dictionary)
-        self.set_points = SetPoints(axis.counts)
+        self.set_points, self.cyclic, self._anew = SetPoints(axis.counts), Cyclic(axis, self.publish), False
+        self._asked = 0  # control word that was written last
         self._words: asyncio.Queue[int | None] = asyncio.Queue()
         self._word, self._mode, self._error, self._told_fault = 0, POSITION, 0, 0
         self._limited = self._homing = self._homed = self._home_failed = False
@@ -160,6 +166,8 @@ class Node:
                 continue  # what an SDO would be told is not told to process data
 
     def _sync(self, *_: object) -> None:
+        if (point := self.cyclic.sync()) is not None:
+            self._loop.call_soon_threadsafe(self.axis.set_point, *point)
         self._loop.call_soon_threadsafe(partial(self.publish, synchronised=True))
 
     def publish(self, *, synchronised: bool = False) -> None:
@@ -211,6 +219,8 @@ class Node:
             still = abs(axis.velocity) < 0.01 * axis.speed
             wanted = self._velocity * axis.count
             word |= (MODE_BIT if still else 0) | (REACHED if abs(axis.velocity - wanted) < 0.02 * axis.speed else 0)
+        elif self._mode in MODES:
+            word |= MODE_BIT if self.cyclic.follows else 0
         else:
             word |= (MODE_BIT if self._homed else 0) | (MODE_ERROR if self._home_failed else 0)
             word |= REACHED if not self._homing else 0
@@ -235,30 +245,41 @@ class Node:
         }.get(index)  # fmt: skip
         return None if shown is None else shown()
 
-    def _written(self, *, index: int, subindex: int, data: bytes, **_: Any) -> None:
-        """Objects that act when they are written; called in the thread of the bus."""
-        value = int.from_bytes(data, "little", signed=index in (c.MODE, 0x607D, c.ABORT))
-        if index == c.MODE:
-            if value not in (0, POSITION, VELOCITY, HOMING):
-                raise canopen.SdoAbortedError(OTHER_VALUE)
-            self._loop.call_soon_threadsafe(self._choose, value)
-        elif index == 0x6081 and not 0 < value <= round(self.axis.speed / self.axis.count):
+    def _refuse(self, index: int, part: int, value: int) -> None:
+        """What the drive does not do."""
+        if index == c.MODE and (value < 0 or (value and not (SUPPORTED | supported(self.axis)) >> (value - 1) & 1)):
+            raise canopen.SdoAbortedError(OTHER_VALUE)
+        if index == 0x6081 and not 0 < value <= round(self.axis.speed / self.axis.count):
             raise canopen.SdoAbortedError(TOO_LARGE if value else OTHER_VALUE)
-        elif index == 0x607D and self.axis.limits:
+        if index == 0x607D and self.axis.limits:
             low, high = map(self.axis.to_counts, self.axis.limits)
             if not low <= value <= high:
                 raise canopen.SdoAbortedError(TOO_LARGE if value > high else 0x06090032)
-        elif index == c.ABORT and value not in (0, 1, 2, 3):
+        if (index == c.ABORT and value not in (0, 1, 2, 3)) or (index == c.CYCLE and part == 1 and not value):
             raise canopen.SdoAbortedError(OTHER_VALUE)
+
+    def _written(self, *, index: int, subindex: int, data: bytes, **_: Any) -> None:
+        """Objects that act when they are written; called in the thread of the bus."""
+        value = int.from_bytes(data, "little", signed=index in (c.MODE, 0x607D, c.ABORT, c.TORQUE, c.PLACE))
+        self._refuse(index, subindex, value)
+        if index == c.MODE:
+            self._loop.call_soon_threadsafe(self._choose, value)
         elif index == c.CONSUMER and subindex:
             self._limit, self._master, self._heard = (value & 0xFFFF) * 1e-3, value >> 16 & 0x7F, time.monotonic()
             self.node.network.subscribe(HEARTBEAT + self._master, self._beat)
         elif index & ~0x3FF in (0x1400, 0x1800) or index & ~0x1FF in (0x1600, 0x1A00):
             self._loop.call_soon_threadsafe(self._loop.call_later, LOOK, self._listen)  # once it is kept
+        elif index in (c.PLACE, c.TORQUE):
+            self.cyclic.write(index, value)
         elif index == c.VELOCITY:
             self._velocity = int.from_bytes(data, "little", signed=True)  # what is stored is not yet that
-            self._loop.call_soon_threadsafe(self._words.put_nowait, None)
+            self.cyclic.write(index, self._velocity)
+            if not self.cyclic.follows:
+                self._loop.call_soon_threadsafe(self._words.put_nowait, None)
         elif index == c.CONTROL:
+            same, self._asked = value == self._asked, value
+            if same and self.cyclic.follows:  # it comes with every target
+                return
             if self._mode == HOMING and value & NEW and not self._word & NEW:
                 self._homed = False  # at once: a master that looks now must not see the reference of before
             self._loop.call_soon_threadsafe(self._words.put_nowait, value)
@@ -268,7 +289,9 @@ class Node:
 
     def _choose(self, mode: int) -> None:
         if mode and mode != self._mode:
-            self._mode = mode
+            self._mode, self._anew = mode, True
+            if mode in MODES or self.cyclic.follows:
+                self._words.put_nowait(None)
             self.publish()
 
     # ---- what the master wants
@@ -277,10 +300,11 @@ class Node:
         """Control words, one by one."""
         while True:
             new = await self._words.get()
-            word_ = self._word if new is None else new  # None: as before, at another velocity
+            word_ = self._word if new is None else new  # None: as before, at another velocity or in another mode
             before, self._word = self._word, word_
             try:
-                await self._lead(word_, before)
+                if new is not None:
+                    await self._lead(word_, before)
                 if self.state == ENABLED:
                     await self._move(word_, before)
                 elif self.set_points.active is not None:
@@ -302,6 +326,7 @@ class Node:
                 await self._order(order)
                 if self.state == ENABLED:
                     self.set_points.drop(self.axis.counts)
+                    self._anew = True
                     await self.axis.enable()  # confirms the first motion, of a simulated axis
 
     async def _order(self, order: int) -> None:
@@ -313,11 +338,17 @@ class Node:
 
     async def _move(self, word_: int, before: int) -> None:
         """What the mode makes of the bits."""
+        anew, self._anew = self._anew or bool(before & HALT), False
+        if self.cyclic.follows and (anew or self.cyclic.mode != self._mode):
+            await self.axis.stop()
         if word_ & HALT and not before & HALT:
             self.set_points.drop(self.axis.counts)
             await self.axis.stop()
         elif word_ & HALT:
             return
+        elif self._mode in MODES:
+            if anew and not self.cyclic.follows:
+                await self._follow()
         elif self._mode == POSITION:
             target = self.set_points.control(word_, self._signed(c.PLACE))
             if target is not None:
@@ -351,6 +382,12 @@ class Node:
                     self.set_points.drop(self.axis.counts)
             goal = self.set_points.reached()
             self.publish()
+
+    async def _follow(self) -> None:
+        """A cyclic mode begins: the axis follows what is sent."""
+        self.axis.let_go()
+        value = int.from_bytes(self.node.get_data(c.CYCLE, 1), "little")
+        self._begin(await self.cyclic.begin(self._mode, value * 10.0 ** self._signed(c.CYCLE, 2)))
 
     async def _home(self) -> None:
         try:

@@ -293,6 +293,11 @@ class AxisService:
             self._kept.cancel()
             self._kept = None
 
+    def set_point(self, stream: int, value: float) -> None:
+        """Send a set-point of a stream, as the axis has it."""
+        if not self.gone.is_set():
+            self._line.tell({"do": "points", "stream": stream, "values": [value]})
+
     async def give_back(self) -> None:
         """Let others command: of protocols that know no session, each motion is one."""
         if self.commands and self._giving.done():

@@ -15,7 +15,7 @@ import socket
 import struct
 import threading
 from collections import deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -240,7 +240,8 @@ class Channel:
         if do in QUESTIONS:
             told = _told(QUESTIONS[do], self.session, asked)
             return {do: told | {"questions": [*QUESTIONS, "log"]} if do == "describe" else told}
-        if do in (own := {"watch": self._watch, "name": self._name, "log": self._log, "note": self._note}):
+        if do in (own := {"watch": self._watch, "name": self._name, "log": self._log, "note": self._note,
+                         "points": self._points}):  # fmt: skip
             return {do: _told(own[do], client, asked)}
         who = str(asked.pop("who", client.who))
         try:
@@ -265,6 +266,12 @@ class Channel:
             more = {} if value is None else {"value": value}
             self.audit.note(who, client=client.number, do=do, id=command, **more)
         return command
+
+    def _points(
+        self, client: Client, stream: object = 0, values: object = (), *, in_turn: object = False, last: object = False
+    ) -> int:
+        """Set-points of a stream; no command, so that nothing of them stands in the log."""
+        return self.session.points(stream, values, client=client.number, in_turn=in_turn, last=last)
 
     def _log(self, _client: Client) -> dict[str, Any]:
         """Who asked for what, and how that ended."""
@@ -472,6 +479,11 @@ class Connection:
         if command not in self._ended:
             self.status()  # what has ended is told before it
         return self._ended.get(command)
+
+    def points(self, stream: int, values: Sequence[float], *, in_turn: bool = False, last: bool = False) -> int:
+        """Send set-points of a stream; gives how many of them were taken."""
+        message = {"do": "points", "stream": stream, "values": [*values], "in_turn": in_turn, "last": last}
+        return self._request(message)["points"]
 
     def wait(self, command: int, timeout: float | None = None) -> Ended:
         """Wait until a command has ended."""

@@ -15,9 +15,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, Self
 
+from detent.control.stream import AHEAD
 from detent.errors import DetentError
 from detent.operate.words import ERRORS, Ended, describe_status, why_not_moving
 
+LOOK = 5e-3  # how often it is looked for room for set-points [s]
 KEEP = 0.05  # how often a jog is kept [s]
 KEEP_JOB = 0.5  # the same of a job
 
@@ -43,6 +45,10 @@ class Link(Protocol):
 
     def ask(self, word: str, value: object = None, speed: float = 1.0) -> int:
         """Ask for something; gives an id."""
+        ...
+
+    def points(self, stream: int, values: Sequence[float], *, in_turn: bool = False, last: bool = False) -> int:
+        """Send set-points of a stream; gives how many of them were taken."""
         ...
 
     def ending(self, command: int) -> Ended | None:
@@ -238,6 +244,42 @@ class LiveAxis:
                 command.wait()
             finally:
                 left.set()
+        return command
+
+    def stream(
+        self, points: Sequence[float], *, of: str = "position", period: float | str = 1e-3, wait: bool = True
+    ) -> Command:
+        """Follow set-points, one in each interpolation period [s], and come to rest at the last one.
+
+        `of` says what they are: positions [m] or [rad], velocities, or of an "effort" shares of its limit. The axis
+        takes them in turn, some ahead of time; where they stop coming it stops within six of their periods.
+
+        Examples
+        --------
+        >>> import detent
+        >>> with detent.live(detent.example("cascade.toml"), wall=False) as axis:
+        ...     enabled = axis.enable(), axis.confirm()
+        ...     played = axis.stream([0.02 + 1e-7 * min(k, 100) ** 2 for k in range(120)])
+        ...     print(f"{axis.position:.4f} m")
+        0.0210 m
+        """
+        command, left = self.do(f"stream_{of}", period, wait=False), [*points]
+
+        def feed() -> None:
+            """Send them as there is room."""
+            rest = left
+            while rest:
+                taken = self.link.points(command.id, rest[:AHEAD], in_turn=True, last=len(rest) <= AHEAD)
+                rest = rest[taken:]
+                with suppress(TimeoutError):
+                    self.link.wait(command.id, LOOK)
+                    return
+
+        if not wait:
+            threading.Thread(target=feed, name="stream", daemon=True).start()
+            return command
+        feed()
+        command.wait()
         return command
 
     def pause(self) -> Command:

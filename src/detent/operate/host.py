@@ -123,7 +123,7 @@ def operation_params(speed: float = 1.0, *, creep: float = 0.1, **more: Any) -> 
         looks = math.ceil(max(window, LEAST_WINDOW) / look - 1e-9)
         lease, job = (math.floor(time * speed / look + 1e-9) for time in (LEASE, JOB_LEASE))  # of who asks
         return OperationParams(
-            window_looks=looks, lease_looks=lease, job_looks=job,
+            look=look, window_looks=looks, lease_looks=lease, job_looks=job,
             settle_looks=math.ceil(SETTLE / look), lowest=limits[0], highest=limits[1], takes=takes,
             performs=int(ops.JOB not in motions), creep=creep, **more
         )  # fmt: skip

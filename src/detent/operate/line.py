@@ -55,6 +55,10 @@ class Line:
             raise DetentError(told["error"])
         return told
 
+    def tell(self, message: dict[str, Any]) -> None:
+        """Say what needs no answer."""
+        self._writer.write(json.dumps(message).encode() + b"\n")
+
     async def _hear(self) -> None:
         try:
             while text := await self._reader.readline():

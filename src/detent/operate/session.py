@@ -1,21 +1,25 @@
 """A live axis in this process: its host, asked in words by several clients."""
 
 import base64
+import math
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, cast
 
 from detent.control import operation as ops
+from detent.control.move_commands import LONGEST_PERIOD
+from detent.control.stream import AHEAD
 from detent.errors import NO_MARK, DetentError
 from detent.methods.method import Leg
 from detent.operate.faults import injection_of, injections
 from detent.operate.host import Host
 from detent.operate.jobs import read_job
-from detent.operate.loop import Board
+from detent.operate.loop import INBOX, Board
 from detent.operate.places import Places
 from detent.operate.scope import CHANNELS, SHOWN, Rows
 from detent.operate.words import PLACES, WORDS, Ended, ended, status_of, value_of
+from detent.units import format_quantity
 
 STEP = 2e-3  # how often an ending is looked for [s]
 LINES = ("stop", "disable")  # never refused
@@ -23,6 +27,8 @@ MOST_ROWS = 2048  # of the ring, in one answer
 LARGEST = 1 << 62  # number of a row
 COUNT = 1e-6  # where a method does not say what counts the position [m]
 TRIES = 8  # to read a status while nothing changes it
+RESERVE = 64  # places of the mailbox that set-points leave to commands
+MOST = 1e12  # what a set-point is below
 NOTE = 0.5  # how often what nobody asks for is taken down [s]
 
 
@@ -106,6 +112,8 @@ class Session:
             kind, about = injection_of(self.host.axis.places, value)
         else:
             about = value_of(WORDS[word], value, self.unit)
+        if kind in ops.STREAMS:
+            self._refuse_period(about)
         with self._lock:
             self.host.note()  # of what nobody waits for, too: the loop keeps the last endings only
         try:
@@ -114,6 +122,37 @@ class Session:
             if word not in LINES:
                 raise
             return self.host.settle(0)  # its line has done it
+
+    def _refuse_period(self, time: float) -> None:
+        """Set-points come in once in a period of the loop: an interpolation period is not shorter than that."""
+        period = self.host.board.loop.period * 1e-9
+        if not period * (1.0 - 1e-9) <= time <= LONGEST_PERIOD:
+            ends = format_quantity(period, "s"), format_quantity(LONGEST_PERIOD, "s")
+            got = format_quantity(time, "s") if math.isfinite(time) else str(time)
+            raise DetentError(
+                f"a stream with a set-point every {got}; expected: {ends[0]}, the period of the loop, to {ends[1]}; "
+                "send them so often, or give the loop another period"
+            )
+
+    def points(
+        self, stream: object, values: object, *, client: int = 1, in_turn: object = False, last: object = False
+    ) -> int:
+        """Send set-points of the stream that has this id; gives how many of them were taken.
+
+        The newest is for now; `in_turn` they wait for one another, and the `last` of them ends the stream.
+        """
+        read, number = _numbers(values), whole_number("points", stream)
+        with self._lock:
+            self.host.note()
+        s, asked = self.host.board.operation.stream, self.host.board.inbox.written - self.host.board.operation.taken
+        room = AHEAD - (s.last - s.first) - asked if in_turn else INBOX - RESERVE - asked
+        taken = read[: max(room, 0)]
+        kinds = [ops.POINT_IN_TURN if in_turn else ops.POINT] * len(taken)
+        if in_turn and last and len(taken) == len(read):
+            kinds[-1:] = [ops.LAST_POINT]
+        for kind, value in zip(kinds, taken, strict=True):
+            self.host.ask(kind, value, id=number, client=client)
+        return len(taken)
 
     def _begin_job(self, value: object, speed: float, client: int, known: Mapping[str, int]) -> int:
         """Read a job and begin it; one at a time, for it has one tray."""
@@ -256,6 +295,15 @@ class Session:
         at, missed, columns = self.host.scope.columns(after, paths, min(most, MOST_ROWS))
         data = packed(columns, "<f8")
         return {"first": at, "rows": len(columns[0]) if columns else 0, "missed": missed, "data": data}
+
+
+def _numbers(values: object) -> list[float]:
+    """Read set-points."""
+    read = cast("list[Any]", values if isinstance(values, list | tuple) else [values])
+    for one in read:
+        if isinstance(one, bool) or not isinstance(one, int | float) or not abs(one) < MOST:
+            raise DetentError(f"points: got {one!r:.60}; expected: numbers below {MOST:g}, in SI units; correct it")
+    return [float(one) for one in read]
 
 
 def whole_number(name: str, value: object) -> int:

@@ -36,6 +36,9 @@ WORDS = {
     "go_to": Word(ops.GO, "number", "to a numbered position"),
     "home": Word(ops.HOME, help="find the reference"),
     "job": Word(ops.JOB, "job", "moves of a file or a list, one after another, or what the axis prints"),
+    "stream_position": Word(ops.STREAM_POSITION, "time", "follow positions that are sent once in this time"),
+    "stream_velocity": Word(ops.STREAM_VELOCITY, "time", "the same of velocities"),
+    "stream_effort": Word(ops.STREAM_EFFORT, "time", "the same of efforts, shares of the limit"),
     "pause": Word(ops.PAUSE, help="the job that is under way comes to rest, and is held"),
     "resume": Word(ops.RESUME, help="go on with it"),
     "take": Word(ops.TAKE, help="take over the command; a motion under way is stopped first"),
@@ -113,7 +116,7 @@ def value_of(word: Word, value: object, unit: str) -> float:
     """Read what a command is about: a number in SI units, or a text with a unit such as "5 mm"."""
     if not word.value:
         return 0.0
-    wanted = {"place": unit, "speed": f"{unit}/s", "number": ""}[word.value]
+    wanted = {"place": unit, "speed": f"{unit}/s", "time": "s", "number": ""}[word.value]
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         shown = "nothing" if value is None else repr(value)
         raise DetentError(f"a command with {shown}; it needs {example_of(wanted)}")
@@ -131,7 +134,7 @@ def example_of(unit: str) -> str:
     >>> example_of("m"), example_of("rad/s"), example_of("")
     ('a value such as "5 mm"', 'a value such as "30 deg/s"', 'a number such as 3')
     """
-    examples = {"m": "5 mm", "m/s": "20 mm/s", "rad": "90 deg", "rad/s": "30 deg/s"}
+    examples = {"s": "1 ms", "m": "5 mm", "m/s": "20 mm/s", "rad": "90 deg", "rad/s": "30 deg/s"}
     return f'a value such as "{examples[unit]}"' if unit in examples else "a number such as 3"
 
 

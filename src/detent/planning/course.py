@@ -15,7 +15,7 @@ from detent.kernel.registers import Registers, block, f8, f8_array, i1, i8, regi
 from detent.kernel.step import hot_step, step
 from detent.planning.speed_ramp import level_speed, passed, ramp, reach, way_to_rest, way_with_stop
 
-REST, GO, RUN, STOP = 0, 1, 2, 3  # modes
+REST, GO, RUN, STOP, LED = 0, 1, 2, 3, 4  # modes
 # What a command gives back; the texts stand in `errors.COURSE_REFUSAL_TEXT`.
 TAKEN, OUT_OF_RANGE, BEYOND_LIMIT, TOO_FAST, UNUSABLE_LIMITS = 0, 1, 2, 3, 4
 
@@ -43,7 +43,7 @@ class Course(Registers):
     position: f8 = register("commanded position", unit="m")
     velocity: f8 = register("commanded velocity", unit="m/s")
     acceleration: f8 = register("commanded acceleration", unit="m/s^2")
-    mode: u1 = register("0 at rest, 1 goes to a target, 2 runs at a velocity, 3 stops", unit="code")
+    mode: u1 = register("0 at rest, 1 goes to a target, 2 runs at a velocity, 3 stops, 4 is led", unit="code")
     target: f8 = register("target, of mode 1", unit="m")
     run: f8 = register("velocity asked for, of mode 2", unit="m/s")
     end: f8 = register("place where the plan ends, at rest", unit="m")
@@ -353,7 +353,7 @@ def lay_stretch(c: Course, t: float, x: float, v: float, a: float, j: float) -> 
 @step
 def advance(p: CourseLimits, c: Course, period: float) -> None:
     """One sample; `p` may be other limits than at the last one. A period that is no time is no sample."""
-    if c.mode == REST or not 0.0 < period <= LONGEST_PERIOD:
+    if c.mode in (REST, LED) or not 0.0 < period <= LONGEST_PERIOD:
         return
     if c.due or differs(p, c.asked):
         follow_limits(p, c)
@@ -375,6 +375,68 @@ def advance(p: CourseLimits, c: Course, period: float) -> None:
     c.position = max(min(x, c.top), c.bottom)
     c.velocity = v + t * (a + t * j / 2.0)
     c.acceleration = a + t * j
+
+
+@step
+def follow(p: CourseLimits, c: Course, target: float, velocity: float, period: float) -> bool:
+    """One sample of a course that is led: to `target`, where it has this velocity; False if it falls short of it.
+
+    It goes no faster than allowed, and nowhere from where a stop would lead past a soft limit: near one it goes as
+    fast as it still can, and rests there. A stop begins without acceleration: whoever leads limits no jerk.
+    """
+    if not is_usable(p) or not 0.0 < period <= LONGEST_PERIOD:
+        return False
+    begin_to_be_led(p, c)
+    x, way, v, most = target, target - c.position, velocity, p.speed * period
+    room = ROUNDING * (abs(target) + most)
+    if abs(way) > most + room or abs(v) * period > most + room:
+        way = min(max(way, -most), most)
+        x, v = c.position + way, way / period
+    if is_past(c.limits, c.position, x, v):
+        v = fastest(c.limits, c.position, way / period, period)
+        x = c.position + v * period
+    c.position, c.velocity, c.acceleration = x, v, 0.0
+    return x == target
+
+
+@step
+def begin_to_be_led(p: CourseLimits, c: Course) -> None:
+    """No plan is under way any more that limits could run over."""
+    if c.mode != LED or differs(p, c.asked):
+        c.mode = REST
+        take_limits(p, c, -FARTHEST, FARTHEST)
+        c.mode = LED
+
+
+@step
+def drift(p: CourseLimits, c: Course, position: float, velocity: float) -> bool:
+    """One sample of a course that is where the axis is; False where that goes too fast, or a stop comes too late."""
+    if not is_usable(p) or not -FARTHEST <= position <= FARTHEST:
+        return False
+    begin_to_be_led(p, c)
+    c.position, c.velocity, c.acceleration = position, min(max(velocity, -p.speed), p.speed), 0.0
+    return abs(velocity) <= p.speed and not is_past(c.limits, position, position, velocity)
+
+
+@step
+def is_past(f: CourseLimits, here: float, x: float, v: float) -> bool:
+    """True where the way to a place, or a stop from there, leads farther past a soft limit."""
+    rest = x + way_to_rest(f.acceleration, f.jerk, v, 0.0)
+    low, high = min(x, rest), max(x, rest)
+    return (high > f.highest and high > here) or (low < f.lowest and low < here)
+
+
+@step
+def fastest(f: CourseLimits, here: float, wanted: float, period: float) -> float:
+    """Velocity up to the one that is wanted after a sample of which a stop still ends at the soft limit."""
+    low, high = 0.0, wanted
+    for _ in range(HALVINGS):
+        v = low + (high - low) / 2.0
+        if is_past(f, here, here + v * period, v):
+            high = v
+        else:
+            low = v
+    return low
 
 
 @step

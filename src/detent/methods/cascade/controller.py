@@ -37,6 +37,7 @@ from detent.sensing.position_sensor import (
 )
 
 ARRIVED, FAULT = 1, 2  # events
+CLOSED, OPEN = 1, 2  # loops, while the drive is on
 
 Feed = tuple[HostArray, HostArray, HostArray, HostArray]
 """What the host lays ready, one entry per sample: a reference's position, velocity and acceleration, or a command."""
@@ -88,7 +89,7 @@ class CascadeController(Registers):
 
     left: i8 = register("ticks until the next sample", unit="tick")
     samples: i8 = register("samples since power-on", unit="count")
-    on: u1 = register("mailbox: 1 while the drive is on, 0 lets the axis coast; a fault clears it")
+    on: u1 = register("mailbox: 1 while the drive is on, 2 with open loops, 0 lets the axis coast; a fault clears it")
     guarded: u1 = register("mailbox: 1 while faults switch off")
     known: u1 = register("mailbox: 1 while the position is known: beyond an end of the travel it is then switched off")
     event: u1 = register("mailbox: 1 in position, 2 fault; nothing goes on until the host has cleared it")
@@ -140,7 +141,21 @@ def engage(c: CascadeController) -> None:
     c.law.integral = 0.0
     enable_guard(c.guard)
     begin_weighing(c.weighing)
-    c.on = 1
+    c.on = CLOSED
+
+
+@step
+def open_loops(c: CascadeController, command: float) -> None:
+    """The amplifier gets this command [V] until another one is given, or the loops are closed."""
+    c.law.command = command
+    c.on = OPEN
+
+
+@step
+def close_loops(c: CascadeController) -> None:
+    """The loops are closed again, on the way."""
+    c.law.integral = 0.0
+    c.on = CLOSED
 
 
 @step
@@ -212,7 +227,10 @@ def refer(c: CascadeController, position: f8_signal, velocity: f8_signal, accele
 
 @step
 def decide(p: CascadeControllerParams, c: CascadeController) -> float:
-    """Position and velocity loop, on the encoders chosen for them; the command [V]."""
+    """Position and velocity loop, on the encoders chosen for them, or what stands in their place; the command [V]."""
+    if c.on == OPEN:
+        c.law.position_error = c.law.velocity_error = 0.0
+        return c.law.command
     position = c.load_sensor.position if p.feedback.position_on_load else c.motor_sensor.position
     velocity = c.load_sensor.velocity if p.feedback.velocity_on_load else c.motor_sensor.velocity
     control_law(p.law, c.law, c.reference, position, velocity)
@@ -299,10 +317,10 @@ def sample(
             look_after(p, c, c.count + c.weighing.moved if lines.motor.lost else lines.motor.count)
             output = output if c.on else 0.0
     warm_up(p.supervision, c.supervision, output)
-    lines.enable, lines.command = c.on, output
+    lines.enable, lines.command = 1 if c.on else 0, output
     if p.brake.present:
         release(p.brake, c.brake, c.on)
-        lines.brake = c.on
+        lines.brake = lines.enable
 
 
 def fit(p: CascadeControllerParams) -> Fit:

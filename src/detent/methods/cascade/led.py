@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from detent.control.brake_line import release
-from detent.control.operation import OperationParams
+from detent.control.operation import STREAM_EFFORT, OperationParams
 from detent.errors import DetentError
 from detent.kernel.loop import HostArray, advance, lay_ready, ticks
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
@@ -140,6 +140,7 @@ def led(spec: CascadeSpec, operation: Callable[..., OperationParams], mode: str)
         params.controller.brake.open += LATE
         state.controller.brake.left = params.controller.brake.open
     made.live.look_ticks = 1
+    made.live.operation.takes &= ~(1 << STREAM_EFFORT)  # what closes the loops does not open them
     return replace(made, params=params, state=state, tick=lines.sample, feed=()), lines
 
 

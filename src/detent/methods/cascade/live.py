@@ -12,6 +12,7 @@ from detent.control.homing import HALT as HALT_NOW
 from detent.control.homing import RUN as RUN_AT
 from detent.control.operation import (
     BEYOND,
+    FOLLOW,
     HALT,
     HOLD,
     HOME,
@@ -23,17 +24,28 @@ from detent.control.operation import (
     REST_OFF,
     RUN,
     SEEK,
+    STREAMS,
     TRAVEL,
     Operation,
     OperationParams,
 )  # fmt: skip
 from detent.control.reaction import SOFT
+from detent.control.stream import EFFORT, POSITION, Stream
 from detent.control.supervision import DISAGREE, SWINGS
+from detent.errors import DRIVEN_OFF, TOO_FAR
 from detent.kernel.loop import lay_ready, serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
 from detent.methods.cascade.build import homing_params, motion_limits
-from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines, engage
+from detent.methods.cascade.controller import (
+    OPEN,
+    CascadeController,
+    CascadeControllerParams,
+    CascadeLines,
+    close_loops,
+    engage,
+    open_loops,
+)
 from detent.methods.cascade.faults import places
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.run import describe_cause
@@ -41,7 +53,18 @@ from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.system import rest_off
 from detent.methods.method import Live
 from detent.methods.moves.legs import legs_of
-from detent.planning.course import Course, CourseLimits, advance, begin_at, come_to_rest, go_to, is_at_rest, run_at
+from detent.planning.course import (
+    Course,
+    CourseLimits,
+    advance,
+    begin_at,
+    come_to_rest,
+    drift,
+    follow,
+    go_to,
+    is_at_rest,
+    run_at,
+)
 from detent.sensing.position_sensor import PositionSensor, position_of, shift_positions
 
 
@@ -122,6 +145,8 @@ def search(  # noqa: PLR0913 - as `serve`, and where the axis is
 def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Operation) -> int:
     """What is freshly demanded; gives a reason to refuse it, 0 for none."""
     d, why = o.demand, 0
+    if c.on == OPEN and not (d.do == FOLLOW and o.stream.quantity == EFFORT):
+        close_loops(c)
     if d.do == REST_OFF:
         c.on = 0
     elif d.do == HOLD:
@@ -135,7 +160,29 @@ def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Ope
         why = run_at(memory.limits, memory.course, min(max(d.velocity, -top), top))
     elif d.do == HALT:
         come_to_rest(memory.limits, memory.course)
+    elif d.do == FOLLOW:
+        set_limits(q, c, memory, o)
+        if o.stream.quantity == POSITION and abs(o.stream.slope) > memory.limits.speed:
+            return TOO_FAR
     return BEYOND if why else 0
+
+
+@step
+def go_along(
+    p: CascadeControllerParams, c: CascadeController, memory: CascadeLive, here: PositionSensor, s: Stream
+) -> int:  # fmt: skip
+    """One sample along a stream; gives why it goes on no longer, 0 while it does."""
+    limits, course, period, rate = memory.limits, memory.course, p.law.period, 0.0
+    if s.quantity == POSITION:
+        rate = s.bend if follow(limits, course, s.value, s.slope, period) else 0.0
+    elif s.quantity != EFFORT:
+        rate = s.slope if follow(limits, course, course.position + s.value * period, s.value, period) else 0.0
+    elif drift(limits, course, here.position, here.velocity):
+        open_loops(c, min(max(s.value, -1.0), 1.0) * p.law.max_command)
+    else:
+        return DRIVEN_OFF
+    c.reference.acceleration = min(max(rate, -limits.acceleration), limits.acceleration)
+    return 0
 
 
 @serves(CascadeLiveParams)
@@ -156,9 +203,12 @@ def serve(  # noqa: PLR0913 - as all of its kind
     c.known = 0 if o.trust == NOT_KNOWN else 1
     if c.on == 0 or before == 0:  # the commanded point is where the axis is
         begin_at(course, here.position)
-    advance(memory.limits, course, p.law.period)
+    if o.demand.do == FOLLOW and a.refused == 0:
+        a.refused = go_along(p, c, memory, here, o.stream)
+    else:
+        advance(memory.limits, course, p.law.period)
+        c.reference.acceleration = course.acceleration
     c.reference.position, c.reference.velocity = course.position, course.velocity
-    c.reference.acceleration = course.acceleration
     a.position, a.velocity = here.position, here.velocity
     a.commanded, a.commanded_velocity = course.position, course.velocity
     a.error = course.position - here.position
@@ -186,7 +236,7 @@ def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Liv
     q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
     q.settled = host.params.controller.limits.window
     ends = spec.limits.lowest, spec.highest
-    motions = (MOVE_TO, MOVE_BY, JOG) if spec.home is None else (MOVE_TO, MOVE_BY, JOG, HOME)
+    motions = MOVE_TO, MOVE_BY, JOG, *STREAMS, *(() if spec.home is None else (HOME,))
     q.operation = operation(host.period, host.params.controller.limits.arrival * host.period, ends, *motions)
     if spec.home is not None:
         q.homing = homing_params(spec, spec.home)
