@@ -4,6 +4,7 @@ import asyncio
 import os
 import select
 import shutil
+import socket
 import subprocess
 import threading
 import tty
@@ -16,6 +17,7 @@ import pytest
 
 import detent
 from detent.axisfile.tables import FacesTable
+from tests import foreign
 from tests.live_processes import STARTED, Running
 
 FACE_KEYS = {f"faces.{name}" for name in FacesTable.model_fields}  # which no register hears
@@ -65,6 +67,25 @@ def faced(
 def connected(live: Faced) -> Any:
     """A client of detent's own, to see what happens, and to command beside."""
     return detent.connect(live.started["channel"])
+
+
+def free_port() -> int:
+    """A port that nobody has now."""
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+@contextmanager
+def repeater() -> Iterator[None]:
+    """Somebody else's repeater of Channel Access, so that no client leaves one of its own behind."""
+    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen([str(foreign.environment("epics").parent / "caproto-repeater")], **quiet)
+    try:
+        yield
+    finally:
+        process.terminate()
+        process.wait()
 
 
 def listening(*processes: int) -> set[tuple[str, str]]:

@@ -73,8 +73,8 @@ def start(name: str, script: str, *words: str, **environ: str) -> "subprocess.Po
     )  # fmt: skip
 
 
-def run(name: str, script: str, *words: str, timeout: float = 60.0, **environ: str) -> dict[str, Any]:
-    """What a script has found: the last line that it prints, as data."""
+def told(name: str, script: str, *words: str, timeout: float = 60.0, **environ: str) -> str:
+    """What a script prints."""
     process = start(name, script, *words, **environ)
     try:
         out, err = process.communicate(timeout=timeout)
@@ -83,6 +83,12 @@ def run(name: str, script: str, *words: str, timeout: float = 60.0, **environ: s
         out, err = process.communicate()
         pytest.fail(f"{script} {' '.join(words)} has not ended within {timeout:g} s\n{out[-2000:]}\n{err[-3000:]}")
     assert process.returncode == 0, f"{script} {' '.join(words)}\n{out[-2000:]}\n{err[-3000:]}"
+    return out
+
+
+def run(name: str, script: str, *words: str, timeout: float = 60.0, **environ: str) -> dict[str, Any]:
+    """What a script has found: the last line that it prints, as data."""
+    out = told(name, script, *words, timeout=timeout, **environ)
     found: dict[str, Any] = json.loads(out.strip().splitlines()[-1])
     MEASURED.extend(float(found[name]) for name in ("round_trip_ms",) if name in found)
     return found

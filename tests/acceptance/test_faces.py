@@ -21,8 +21,18 @@ from typing import Any
 
 import numba
 import pytest
-from tests import foreign
-from tests.face_rig import Faced, connected, drive_on_virtual, faced, family, listening, wire
+from tests import foreign, page_session
+from tests.face_rig import (
+    Faced,
+    connected,
+    drive_on_virtual,
+    faced,
+    family,
+    free_port,
+    listening,
+    repeater,
+    wire,
+)
 from tests.places import ROOT
 
 from detent.faces.child import FACES
@@ -335,13 +345,6 @@ TYPES = {
 NUMBERS = {"string": 0, "short": 1, "float": 2, "enum": 3, "long": 5, "double": 6}  # of Channel Access
 
 
-def free_port() -> int:
-    """A port that nobody has now."""
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
-
-
 @dataclass
 class Epics:
     """An axis with both records, and what their clients are told."""
@@ -359,18 +362,13 @@ class Epics:
 
 @pytest.fixture(scope="module")
 def epics(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Epics]:
-    """The cascade axis as a motor record; somebody else's repeater, so that no client leaves one of its own behind."""
+    """The cascade axis as a motor record."""
     pytest.importorskip("caproto")
     pytest.importorskip("p4p")
     places = [f"{RECORD}@:{free_port()}" for _ in range(2)]
-    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    repeater = subprocess.Popen([str(foreign.environment("epics").parent / "caproto-repeater")], **quiet)
-    try:
-        with faced(tmp_path_factory.mktemp("epics"), "--epics", places[0], "--pva", places[1]) as live:
-            yield Epics(live)
-    finally:
-        repeater.terminate()
-        repeater.wait()
+    options = "--epics", places[0], "--pva", places[1]
+    with repeater(), faced(tmp_path_factory.mktemp("epics"), *options) as live:
+        yield Epics(live)
 
 
 WINDOW = 0.05  # of the example, limits.travel / 10000 [mm]
@@ -958,36 +956,29 @@ def test_28_four_faces_and_a_panel_show_the_same_sample(axis, plain):
     assert late <= 1.5 * without + 0.005
 
 
-PAGES = {
-    "scan-with-bluesky": ("epics",), "cia402-drive-without-hardware": ("canopen",), "modbus-hand-shake": ("modbus",),
-    "line-protocols": ("scpi", "grbl", "gcs", "zaber", "alpaca"),
-}  # fmt: skip
-"""Of each face, the page with its session."""
+SESSIONS = page_session.sessions()
+SHORT = {"modbus-hand-shake"}  # of the others one takes longer than all that `make test` may
 
 
-def test_31_each_face_has_a_page_whose_session_the_tests_run():
-    tested = Path(__file__).read_text(encoding="utf-8")
-    assert {face for faces in PAGES.values() for face in faces} | {"pva"} == set(FACES)
-    for page, faces in PAGES.items():
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, marks=() if page in SHORT else pytest.mark.wide) for page in sorted(SESSIONS)]
+)
+def test_31_a_page_does_what_it_shows(page, tmp_path):
+    begun = page_session.run(SESSIONS[page], tmp_path)
+    text = (ROOT / "docs" / "how-to" / f"{page}.md").read_text(encoding="utf-8")
+    assert begun == re.findall(r"literalinclude\} \.\./\.\./tests/clients/(\w+)\.py", text)
+
+
+def test_31_each_face_has_a_page_with_a_session_and_what_its_protocol_cannot_protect():
+    shown = {word for commands in SESSIONS.values() for word in commands[0].text.split() if word.startswith("--")}
+    assert shown == {f"--{face}" for face in FACES} | {"--commands"}
+    scripts = [command.text.split()[1] for commands in SESSIONS.values() for command in commands[1:]]
+    assert {f"{script}.py" for script in page_session.SCRIPTS} == {one for one in scripts if one.endswith(".py")}
+    for page in SESSIONS:
         text = (ROOT / "docs" / "how-to" / f"{page}.md").read_text(encoding="utf-8")
-        assert text.split("\n\n")[1].startswith("What ")
-        assert "cannot protect" in text or "can protect" in text
-        shown = re.findall(r"literalinclude\} \.\./\.\./tests/clients/(\w+)\.py", text)
-        assert len(shown) >= len(faces)
-        assert all(f'"{script}"' in tested or f"clients.{script} " in tested for script in shown)
-        assert all(f"--{face}" in text for face in faces)
-
-
-def test_31_a_first_scan(epics):
-    found = epics.run("epics", "first_scan", RECORD)
-    assert (found["points"], found["unit"]) == (21, "mm")
-    assert found["worst"] <= WINDOW
-
-
-def test_31_twenty_lines_of_a_plc(axis):
-    found = foreign.run("modbus", "plc", axis.port("modbus"))
-    assert (found["enable"], found["move"]) == ([2, 0], [2, 0])
-    assert near(found["position"] * 1e-3, 45.0)
+        first = text.split("\n\n")[1]
+        assert first.startswith("What ")
+        assert " protect" in first
 
 
 def test_32_nothing_listens_unless_it_is_asked_for_but_the_panel_on_loopback(tmp_path):
