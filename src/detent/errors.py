@@ -155,6 +155,7 @@ DRIVE_FAULT, DRIVE_LOST, LOOP_OVERRUN, LOOP_DEAD, BROKEN, OTHER_HARDWARE = 24, 4
 SENSOR_LOST, OVER_CURRENT, MOTOR_LOAD = 1, 20, 21  # a drive has found them; of 1 and 21 a guard may know, too
 NO_MARK = 55  # refusal of a motion that a power cut would make a riddle of
 NOT_AT_REST, NOTHING_TO_UNDO = 111, 112  # refusals of what is asked of a position table
+ON_LOCAL, ON_REMOTE = 113, 114  # refusals by the selector of who commands
 
 REFUSAL_TEXT: dict[int, str] = {
     1: "the encoder is not heard; check its cable and supply, reset, and find the reference anew",
@@ -191,6 +192,10 @@ REFUSAL_TEXT: dict[int, str] = {
     110: "the first motion since enabling has not been confirmed, and a job goes at speeds of its own; confirm first",
     111: "the axis moves, and where it is cannot be taught; wait until it rests, or stop it",
     112: "there is no change of the position table left to take back, or to make again; look at the table",
+    113: "the selector stands on local, where panel and programs command, and faces read and stop; turn it at the "
+    "panel, or with: detent connect FILE selector both",
+    114: "the selector stands on remote, where only faces command; turn it at the panel, or with: detent connect FILE "
+    "selector both",
     201: "the table was still moving; wait until it stands, or stop it",
     202: "the position table has no such number; name one that it has, or add it to the axis file",
     203: "the way is longer than the remaining angle can count; name a nearer position",

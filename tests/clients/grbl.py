@@ -3,6 +3,8 @@
 import json
 import sys
 import time
+import tty
+from pathlib import Path
 
 from grbl_streamer import GrblStreamer
 
@@ -73,4 +75,13 @@ until(lambda: streamer.cmode == "Idle")
 found["unlocked"] = streamer.cmode
 streamer.poll_stop()
 streamer.disconnect()
+found["round_trips"] = []  # [s], of a status, which the library asks for in a rhythm of its own
+with Path(sys.argv[1]).open("r+b", buffering=0) as line:
+    tty.setraw(line)
+    for _ in range(200):
+        begin, answer = time.perf_counter(), b""
+        line.write(b"?")
+        while not answer.endswith(b">\r\n"):
+            answer += line.read(1)
+        found["round_trips"].append(time.perf_counter() - begin)
 print(json.dumps(found))

@@ -25,6 +25,7 @@ class Record(PVGroup):
 
     motor = pvproperty(value=0.0, name="", record="motor", precision=4)
     trust = pvproperty(value="", name=":trust", max_length=16, read_only=True)
+    selector = pvproperty(value="", name=":selector", max_length=16, read_only=True)
     state = pvproperty(value="", name=":state", max_length=40, read_only=True)
     fault = pvproperty(value=0, name=":fault", read_only=True)
     fault_text = pvproperty(value="", name=":fault_text", max_length=240, read_only=True)

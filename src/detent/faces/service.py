@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from detent.errors import AxisError, DetentError
+from detent.errors import ON_LOCAL, AxisError, DetentError
 from detent.operate.line import PATIENCE, Line
 
 RATE = 50.0  # samples that are shown in a second
@@ -20,6 +20,7 @@ KEEP = 0.05  # how often a jog is kept on behalf of who holds it [s]
 MOVES = "move to", "move by", "jog", "go", "home", "job"
 MOTIONS = "move_to", "move_by", "jog", "home", "stop"  # by the words that ask for them
 LEASE_LOST, SECOND, BEYOND, UNREFERENCED, READ_ONLY = 41, 43, 31, 35, 120
+NOT_YOURS = SECOND, READ_ONLY, ON_LOCAL  # refusals of who may not command, at all or now
 OPEN = "stop", "disable"  # to everyone, also where a face may only read
 USER_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / math.pi)}
 """Unit in which a face shows positions by that of the axis, and how many of it are one of that."""
@@ -76,7 +77,7 @@ class AxisService:
     @classmethod
     async def open(cls, channel: Path, who: str, *, commands: bool = False) -> "AxisService":
         """Attach to an axis, under a name that its panel shows and its log keeps."""
-        line = await Line.open(channel, who)
+        line = await Line.open(channel, who, remote=True)
         service = cls(line, (await line.ask({"do": "describe"}))["describe"], commands=commands)
         await line.ask({"do": "watch", "rate": RATE})
         await asyncio.wait_for(service._come.wait(), PATIENCE)
@@ -187,6 +188,11 @@ class AxisService:
     def is_others(self) -> bool:
         """True while somebody else commands: what is asked here is refused."""
         return self.status["client"] not in (0, self._number)
+
+    @property
+    def may_command(self) -> bool:
+        """True while what is asked here is done: nobody else commands, and the selector does not stand on local."""
+        return self.commands and not self.is_others and self.status["selector"] != "local"
 
     def share(self, speed: float) -> float:
         """Share of the largest speed that a speed is, within what a command takes."""
