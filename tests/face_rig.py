@@ -9,7 +9,7 @@ import subprocess
 import threading
 import tty
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -70,10 +70,16 @@ def connected(live: Faced) -> Any:
 
 
 def free_port() -> int:
-    """A port that nobody has now."""
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
+    """A port that nobody has now, nor as one of datagrams, nor the one behind it, where PV Access hears searches."""
+    while True:
+        with socket.socket() as one, ExitStack() as others:
+            one.bind(("127.0.0.1", 0))
+            port = one.getsockname()[1]
+            with suppress(OSError, OverflowError):
+                for beside in (port, port + 1):
+                    other = others.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+                    other.bind(("0.0.0.0", beside))  # noqa: S104 - to see that it can be had
+                return port
 
 
 @contextmanager

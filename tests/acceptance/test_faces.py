@@ -420,8 +420,77 @@ def test_06_every_field_has_its_type(epics):
     assert found["pyepics"] == expected
     assert found["aioca"] == {field: NUMBERS[kind] for field, kind in expected.items()}
     assert found["none"] == []
-    assert (found["extras"]["trust"], found["extras"]["state"]) == ("referenced", "operation enabled")
+    with connected(epics.live) as own:
+        assert (found["extras"]["trust"], found["extras"]["state"]) == ("referenced", own.status["state"])
     assert found["extras"]["sample"].count(",") == 4
+
+
+SIGNALS = "commanded", "error", "controller:reference:velocity"
+HOLDS = 8  # channels that somebody may look at
+
+
+def held(live: Faced, *channels: str) -> list[str]:
+    """Which channels the ring holds."""
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect(live.started["channel"])
+        answers = line.makefile()
+        found: list[str] = []
+        for one in channels:
+            line.sendall(json.dumps({"do": "scope", "channels": [one.replace(":", ".")], "rows": 1}).encode() + b"\n")
+            found += [one] if "scope" in json.loads(answers.readline()) else []
+    return found
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("kind", ["ca", "pva"])
+def test_06_signals_of_the_method_cost_something_while_somebody_looks(epics, kind):
+    client = foreign.start(
+        "epics", "signals", RECORD, kind, ",".join(SIGNALS), **epics.told({"ca": "epics", "pva": "pva"}[kind])
+    )
+    try:
+        found = json.loads(client.stdout.readline())
+        assert found["units"] == ["m", "m", "m/s"]
+        assert found["severity"] == [0, 0, 0]
+        assert found.get("access", [False]) == [False] * len(found.get("access", [False]))
+        assert found["ends"][0] == found["last"] == pytest.approx(0.04, abs=1e-9)  # a double, not four bytes
+        assert abs(found["ends"][1]) <= WINDOW * 1e-3
+        assert found["ends"][2] == 0.0
+        assert min(found["changes"]) > 5
+        assert 5.0 < found["rate"] <= 55.0
+        assert held(epics.live, SIGNALS[2], "controller:law:integral") == [SIGNALS[2]]
+        client.stdin.write("\n")
+        client.stdin.flush()
+        assert client.stdout.readline() == "left\n"
+        until(lambda: held(epics.live, SIGNALS[2]) == [])
+    finally:
+        client.stdin.close()
+        client.wait(20)
+        client.stdout.close()
+        client.stderr.close()
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("kind", ["ca", "pva"])
+def test_06_a_signal_that_finds_no_place_says_so(epics, kind):
+    with connected(epics.live) as own:
+        names = [one["name"].replace(".", ":") for one in own.about["channels"] if "controller." in one["name"]]
+    wanted = names[: HOLDS + 1]
+    client = foreign.start(
+        "epics", "signals", RECORD, kind, ",".join(wanted), **epics.told({"ca": "epics", "pva": "pva"}[kind])
+    )
+    out, err = client.communicate("\n\n", timeout=60)
+    assert client.returncode == 0, err
+    assert json.loads(out.splitlines()[0])["severity"] == [0] * HOLDS + [3]
+
+
+@pytest.mark.wide
+def test_06_a_search_over_pv_access_is_answered_on_the_printed_address_only(epics):
+    told, script = epics.told("pva"), "pva"
+    assert "selector" in foreign.run("epics", script, RECORD, "look", **told)
+    elsewhere = foreign.start("epics", script, RECORD, "look", **told | {"EPICS_PVA_ADDR_LIST": "127.0.0.2"})
+    _, err = elsewhere.communicate(timeout=30)
+    assert elsewhere.returncode
+    assert "TimeoutError" in err
 
 
 def test_07_a_jog_lives_by_repeated_puts(epics):
@@ -815,42 +884,15 @@ def watched(axis: Faced) -> dict[str, Any]:
     raise AssertionError("no status came")
 
 
-def test_29_a_second_commander_is_refused_by_each_protocol_and_may_stop(axis):
-    with connected(axis) as own:
-        own.do("take")
-        own.enable()
-        own.confirm()
-        moving = own.move_to("400 mm", speed=0.1, wait=False)
-        scpi = foreign.run("visa", "scpi", axis.place("scpi"), "refused")
-        assert not scpi["refused"].startswith("0,")
-        assert "(43)" in scpi["move_refused"]
-        assert scpi["stop"].startswith("0,")
-        with pytest.raises(Exception, match="stop ended it"):
-            moving.wait()
-        for environ, script, place in (
-            ("pi", "gcs", axis.port("gcs")), ("zaber", "zaber", axis.port("zaber")),
-        ):  # fmt: skip
-            moving = own.move_to("400 mm", speed=0.05, wait=False)
-            found = foreign.run(environ, script, place, "refused")
-            assert found["move"], f"{script} moved an axis that somebody else commands"
-            with pytest.raises(Exception, match="stop ended it"):
-                moving.wait()
-        moving = own.move_to("400 mm", speed=0.05, wait=False)
-        found = foreign.run("alpaca", "alpaca", axis.place("alpaca"), "focuser", "refused")
-        assert found["move"] == "InvalidOperationException"
-        with pytest.raises(Exception, match="stop ended it"):
-            moving.wait()
-        moving = own.move_to("400 mm", speed=0.05, wait=False)
-        found = foreign.run("modbus", "modbus", axis.port("modbus"), "refused")
-        assert (found["move"], found["stop"]) == ([4, 43], [2, 0])
-        with pytest.raises(Exception, match="stop ended it"):
-            moving.wait()
+SECOND, ON_LOCAL = 43, 113  # refusals: somebody else commands; the selector stands on local
+WHYS = pytest.mark.parametrize("why", [SECOND, pytest.param(ON_LOCAL, marks=pytest.mark.wide)])
 
 
 @contextmanager
-def stopped_by_another(live: Faced) -> Iterator[Any]:
-    """Somebody leads a move from 20 mm, and has it ended by a stop of another before it arrives."""
+def stopped_by_another(live: Faced, why: int = SECOND) -> Iterator[Any]:
+    """Somebody leads a move from 20 mm, and has it ended by a stop of another, who may not command."""
     with connected(live) as own:
+        own.select("local" if why == ON_LOCAL else "both")
         own.do("take")
         own.enable()
         own.confirm()
@@ -859,32 +901,82 @@ def stopped_by_another(live: Faced) -> Iterator[Any]:
         yield own
         with pytest.raises(Exception, match="stop ended it"):
             moving.wait()
+        own.select("both")
         own.do("leave")
 
 
-def test_29_a_second_commander_by_epics_is_refused_and_may_stop(epics):
-    with stopped_by_another(epics.live):
+def refusals_of(axis: Faced, why: int) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
+    """Of each client, what it was told, and what is right; each has asked for a motion, and stopped."""
+    found = foreign.run("visa", "scpi", axis.place("scpi"), "refused")
+    assert f"({why})" in found["move_refused"]
+    names, number = ("refused", "move_refused", "stop"), {SECOND: "-200", ON_LOCAL: "-201"}[why]
+    yield {name: found[name].partition(",")[0] for name in names}, dict(zip(names, (number, number, "0"), strict=True))
+    code = {SECOND: 5, ON_LOCAL: 51}[why]
+    yield foreign.run("pi", "gcs", axis.port("gcs"), "refused"), {"servo": code, "move": code}
+    words = {"home": "REMOTE", "move": "REMOTE", "stop": ""}
+    yield foreign.run("zaber", "zaber", axis.port("zaber"), "refused"), words
+    found = foreign.run("alpaca", "alpaca", axis.place("alpaca"), "focuser", "refused")
+    yield found, {"move": "InvalidOperationException", "halt": ""}
+    found = foreign.run("modbus", "modbus", axis.port("modbus"), "refused")
+    assert [found["identification"][12] >> bit & 1 for bit in (11, 12)] == [1, int(why == ON_LOCAL)]
+    yield found, {"move": [4, why], "stop": [2, 0]}
+
+
+@WHYS
+def test_29_a_second_commander_is_refused_by_each_protocol_and_may_stop(axis, why):
+    with connected(axis) as own:
+        own.select("local" if why == ON_LOCAL else "both")
+        own.do("take")
+        own.enable()
+        own.confirm()
+        moving = own.move_to("450 mm", speed=0.05, wait=False)
+        for found, known in refusals_of(axis, why):
+            assert {name: found[name] for name in known} == known
+            with pytest.raises(Exception, match="stop ended it"):
+                moving.wait()
+            moving = own.move_to("450 mm", speed=0.05, wait=False)
+        own.stop()
+        own.select("both")
+
+
+@WHYS
+def test_29_a_second_commander_by_epics_is_refused_and_may_stop(epics, why):
+    with stopped_by_another(epics.live, why):
         found = epics.run("epics", "ophyd_motor", RECORD, "pyepics", "refused")
         assert found["put"] == "ErrorResponseReceived"
         assert found["set_point"] != 60.0
+        assert found["selector"] == ("local" if why == ON_LOCAL else "both")
 
 
-def test_29_a_second_commander_by_grbl_is_refused_and_may_stop(axis):
+@pytest.mark.wide
+@WHYS
+def test_29_a_second_commander_by_pva_is_refused_and_may_stop(epics, why):
+    with stopped_by_another(epics.live, why):
+        found = epics.run("pva", "pva", RECORD, "refused")
+        assert f"({why})" in found["put"]
+        assert found["selector"] == ("local" if why == ON_LOCAL else "both")
+
+
+@WHYS
+def test_29_a_second_commander_by_grbl_is_refused_and_may_stop(axis, why):
     with connected(axis) as own:
+        own.select("local" if why == ON_LOCAL else "both")
         own.do("take")
         own.enable()
         client = foreign.start("grbl", "grbl", axis.place("grbl"), "refused")
         assert json.loads(client.stdout.readline()) == {"move": ["error:9"]}
         with pytest.raises(Exception, match="stop ended it"):  # whose connection is not at rest begins with a stop
             own.move_to("450 mm", speed=0.05)
+        own.select("both")
         own.do("leave")
         assert client.wait(20) == 0, client.stderr.read()
         client.communicate()
 
 
+@WHYS
 @pytest.mark.parametrize("word", [0x0B, 0x10F])  # quick stop, halt
-def test_29_a_second_master_sees_that_the_drive_is_not_remote_and_may_stop(still, word):
-    with drive_on_virtual(still, f"second {word}") as (_, network, sheet), stopped_by_another(still) as own:
+def test_29_a_second_master_sees_that_the_drive_is_not_remote_and_may_stop(still, word, why):
+    with drive_on_virtual(still, f"second {word} {why}") as (_, network, sheet), stopped_by_another(still, why) as own:
         node = remote(network, sheet)
         assert not node.sdo[0x6041].raw >> 9 & 1
         running = own.status["running"]
@@ -894,6 +986,39 @@ def test_29_a_second_master_sees_that_the_drive_is_not_remote_and_may_stop(still
         time.sleep(0.3)
         assert own.status["running"]["id"] == running["id"]
         node.sdo[0x6040].raw = word
+
+
+def test_29_the_remote_bit_is_there_unless_the_selector_stands_on_local(still):
+    with drive_on_virtual(still, "selector") as (_, network, sheet), connected(still) as own:
+        node = remote(network, sheet)
+        for stands, bit in (("both", 1), ("local", 0), ("remote", 1)):
+            own.select(stands)
+            until(lambda bit=bit: node.sdo[0x6041].raw >> 9 & 1 == bit)
+        own.select("both")
+
+
+def test_29_scpi_locks_the_others_out_unless_the_selector_stands_on_local(axis):
+    with socket.create_connection(("127.0.0.1", int(axis.port("scpi")))) as line, connected(axis) as own:
+        answers = line.makefile("rb")
+
+        def asked(what: str) -> str:
+            line.sendall(what.encode() + b"\n")
+            return answers.readline().decode().strip()
+
+        assert asked("SYST:REM;SYST:SEL?") == '"remote"'
+        with pytest.raises(Exception, match="selector stands on remote"):
+            own.enable()
+        own.stop()  # is taken all the same
+        assert asked("SYST:LOC;SYST:SEL?") == '"both"'
+        own.select("local")
+        assert asked("SYST:REM;SYST:SEL?") == '"local"'
+        assert asked("SYST:ERR?").startswith('-201,"Invalid while in local')
+        own.select("both")
+
+        def turned() -> list[str]:
+            return [one["value"] for one in map(json.loads, audit_of(axis)) if one.get("do") == "selector"]
+
+        until(lambda: turned()[-5:] == ["remote", "both", "local", "remote", "both"])  # the refused one among them
 
 
 Shown = dict[int, tuple[str, int, str, int]]  # by the number of the period: state, count, trust, fault

@@ -1,6 +1,7 @@
 """grbl-streamer: connect, stream twenty lines, hold and resume, reset in motion."""
 
 import json
+import os
 import sys
 import time
 import tty
@@ -17,7 +18,9 @@ def until(met, seconds=10.0):
     begin = time.monotonic()
     while not met():
         if time.monotonic() - begin > seconds:
-            raise SystemExit(f"waited in vain; {streamer.cmode} {streamer.cmpos} {events[-15:]}")
+            sys.stderr.write(f"waited in vain; {streamer.cmode} {streamer.cmpos} {events[-15:]}\n")
+            sys.stderr.flush()
+            os._exit(1)  # its threads would go on for ever
         time.sleep(0.01)
 
 
@@ -38,6 +41,8 @@ if "refused" in sys.argv:
     until(lambda: abs(streamer.cmpos[0] - place) > 1.0)
     streamer.softreset()
     time.sleep(0.5)
+    streamer.killalarm()  # of a reset in motion, for who comes next
+    time.sleep(0.2)
     streamer.poll_stop()
     streamer.disconnect()
     raise SystemExit

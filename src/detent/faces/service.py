@@ -6,7 +6,7 @@ that does not depend on how many clients the face has, for they share the newest
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -114,6 +114,15 @@ class AxisService:
     async def refresh(self) -> None:
         """The axis now, not as it was up to a fiftieth of a second ago."""
         self._take(await self._line.ask({"do": "status"}))
+
+    async def show(self, channels: Sequence[str]) -> None:
+        """Let the ring hold these channels of the scope; the status goes on to come."""
+        await self._line.ask({"do": "watch", "rate": RATE, "channels": list(channels)})
+
+    async def newest(self, channels: Sequence[str]) -> dict[str, Any]:
+        """Their newest rows, as the channel packs them."""
+        first = max(self.status["loop"]["periods"] - 1, 0)
+        return (await self._line.ask({"do": "scope", "channels": list(channels), "first": first}))["scope"]
 
     @property
     def sample(self) -> Sample:
