@@ -4,11 +4,12 @@ import asyncio
 import os
 import select
 import shutil
+import socket
 import subprocess
 import threading
 import tty
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import pytest
 
 import detent
 from detent.axisfile.tables import FacesTable
+from tests import foreign
 from tests.live_processes import STARTED, Running
 
 FACE_KEYS = {f"faces.{name}" for name in FacesTable.model_fields}  # which no register hears
@@ -71,6 +73,31 @@ def faced(
 def connected(live: Faced, motor: str = "") -> Any:
     """A client of detent's own, to see what happens, and to command beside."""
     return detent.connect(live.channels[motor])
+
+
+def free_port() -> int:
+    """A port that nobody has now, nor as one of datagrams, nor the one behind it, where PV Access hears searches."""
+    while True:
+        with socket.socket() as one, ExitStack() as others:
+            one.bind(("127.0.0.1", 0))
+            port = one.getsockname()[1]
+            with suppress(OSError, OverflowError):
+                for beside in (port, port + 1):
+                    other = others.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+                    other.bind(("0.0.0.0", beside))  # noqa: S104 - to see that it can be had
+                return port
+
+
+@contextmanager
+def repeater() -> Iterator[None]:
+    """Somebody else's repeater of Channel Access, so that no client leaves one of its own behind."""
+    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen([str(foreign.environment("epics").parent / "caproto-repeater")], **quiet)
+    try:
+        yield
+    finally:
+        process.terminate()
+        process.wait()
 
 
 def listening(*processes: int) -> set[tuple[str, str]]:
@@ -131,17 +158,18 @@ def drive_on_virtual(live: Faced, channel: str, *, commands: bool = True) -> Ite
     from detent.faces.service import Desk
 
     loop = asyncio.new_event_loop()
-    thread = threading.Thread(target=loop.run_forever)
+    thread = threading.Thread(target=loop.run_forever, daemon=True)
     thread.start()
     desk = Desk(live.channels, "canopen", commands)
     network = canopen.Network()
     network.connect(interface="virtual", channel=channel)
     try:
-        places = asyncio.run_coroutine_threadsafe(node402.serve(desk, f"virtual:{channel}@5"), loop).result(10)
+        places = asyncio.run_coroutine_threadsafe(node402.serve(desk, f"virtual:{channel}@5"), loop).result(60)
         yield desk, network, places[2].removeprefix("EDS ")
     finally:
         network.disconnect()
-        desk.server.disconnect()
+        if desk.server is not None:
+            desk.server.disconnect()
 
         async def leave() -> None:
             desk.close()
@@ -150,7 +178,7 @@ def drive_on_virtual(live: Faced, channel: str, *, commands: bool = True) -> Ite
                 task.cancel()
             await asyncio.gather(*others, return_exceptions=True)
 
-        asyncio.run_coroutine_threadsafe(leave(), loop).result(10)
+        asyncio.run_coroutine_threadsafe(leave(), loop).result(60)
         loop.call_soon_threadsafe(loop.stop)
         thread.join()
         loop.close()

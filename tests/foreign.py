@@ -29,9 +29,11 @@ PACKAGES = {
     "zaber": ("zaber-motion==10.2.0",),
 }  # fmt: skip
 """What is in each environment: their pins fight, and some of them with those of detent."""
+NPM = "modbus-serial@8.0.25"
 
 
-MEASURED: list[float] = []  # times of a question and its answer [ms], for tests.face_table
+MEASURED: dict[str, Any] = {}
+"""What the test that runs has measured, for tests.face_table: times of a question and its answer, loads."""
 
 
 def missing(why: str) -> None:
@@ -73,8 +75,8 @@ def start(name: str, script: str, *words: str, **environ: str) -> "subprocess.Po
     )  # fmt: skip
 
 
-def run(name: str, script: str, *words: str, timeout: float = 60.0, **environ: str) -> dict[str, Any]:
-    """What a script has found: the last line that it prints, as data."""
+def told(name: str, script: str, *words: str, timeout: float = 60.0, **environ: str) -> str:
+    """What a script prints."""
     process = start(name, script, *words, **environ)
     try:
         out, err = process.communicate(timeout=timeout)
@@ -83,8 +85,21 @@ def run(name: str, script: str, *words: str, timeout: float = 60.0, **environ: s
         out, err = process.communicate()
         pytest.fail(f"{script} {' '.join(words)} has not ended within {timeout:g} s\n{out[-2000:]}\n{err[-3000:]}")
     assert process.returncode == 0, f"{script} {' '.join(words)}\n{out[-2000:]}\n{err[-3000:]}"
+    return out
+
+
+def run(name: str, script: str, *words: str, timeout: float = 60.0, **environ: str) -> dict[str, Any]:
+    """What a script has found: the last line that it prints, as data."""
+    out = told(name, script, *words, timeout=timeout, **environ)
     found: dict[str, Any] = json.loads(out.strip().splitlines()[-1])
-    MEASURED.extend(float(found[name]) for name in ("round_trip_ms",) if name in found)
+    return measured(found)
+
+
+def measured(found: dict[str, Any]) -> dict[str, Any]:
+    """Keep the times of questions and their answers among what a script has found [s]: median, and 99 of 100 [ms]."""
+    if "round_trips" in found:
+        times = sorted(1e3 * time for time in found["round_trips"])
+        MEASURED["round_trips"] = {"p50": times[len(times) // 2], "p99": times[len(times) * 99 // 100]}
     return found
 
 

@@ -156,6 +156,7 @@ SENSOR_LOST, OVER_CURRENT, MOTOR_LOAD = 1, 20, 21  # a drive has found them; of 
 NO_MARK = 55  # refusal of a motion that a power cut would make a riddle of
 NOT_AT_REST, NOTHING_TO_UNDO = 111, 112  # refusals of what is asked of a position table
 TOO_FAR, DRIVEN_OFF = 113, 114  # why a stream of set-points does not begin, or does not go on
+ON_LOCAL, ON_REMOTE = 115, 116  # refusals by the selector of who commands
 
 REFUSAL_TEXT: dict[int, str] = {
     1: "the encoder is not heard; check its cable and supply, reset, and find the reference anew",
@@ -195,6 +196,10 @@ REFUSAL_TEXT: dict[int, str] = {
     113: "the first set-point lies farther away than the axis goes in an interpolation period; begin where it stands",
     114: "the effort drove the axis to its largest speed, or to where it could just stop before a soft limit, and it "
     "was brought to rest; ask for less, and sooner for the other way",
+    115: "the selector stands on local, where panel and programs command, and faces read and stop; turn it at the "
+    "panel, or with: detent connect FILE selector both",
+    116: "the selector stands on remote, where only faces command; turn it at the panel, or with: detent connect FILE "
+    "selector both",
     201: "the table was still moving; wait until it stands, or stop it",
     202: "the position table has no such number; name one that it has, or add it to the axis file",
     203: "the way is longer than the remaining angle can count; name a nearer position",

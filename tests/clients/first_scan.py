@@ -1,6 +1,5 @@
 """A first scan of a simulated stage: 21 points, and how far the read-back was from the set-point."""
 
-import json
 import sys
 
 from bluesky import RunEngine
@@ -16,4 +15,4 @@ engine.subscribe(lambda kind, document: events.append(document["data"]) if kind 
 engine(scan([motor], motor, 30, 50, 21))
 
 worst = max(abs(one["motor"] - one["motor_user_setpoint"]) for one in events)
-print(json.dumps({"points": len(events), "worst": worst, "unit": motor.egu}))
+print(f"{len(events)} events, the worst {worst:.4f} {motor.egu} from its set-point")

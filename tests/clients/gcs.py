@@ -48,8 +48,9 @@ with PISocket(host="127.0.0.1", port=int(sys.argv[1])) as gateway:
     while device.IsMoving(axis)[axis] and time.monotonic() - begin < 2.0:
         time.sleep(0.01)
     found |= {"stopped": device.qPOS()[axis], "moving": device.IsMoving(axis)[axis]}
-    begin = time.perf_counter()
-    for _ in range(50):
+    found["round_trips"] = []  # [s]
+    for _ in range(200):
+        begin = time.perf_counter()
         device.qPOS()
-    found["round_trip_ms"] = (time.perf_counter() - begin) / 50 * 1e3
+        found["round_trips"].append(time.perf_counter() - begin)
     print(json.dumps(found))

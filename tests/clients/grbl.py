@@ -1,8 +1,11 @@
 """grbl-streamer: connect, stream twenty lines, hold and resume, reset in motion."""
 
 import json
+import os
 import sys
 import time
+import tty
+from pathlib import Path
 
 from grbl_streamer import GrblStreamer
 
@@ -15,7 +18,9 @@ def until(met, seconds=10.0):
     begin = time.monotonic()
     while not met():
         if time.monotonic() - begin > seconds:
-            raise SystemExit(f"waited in vain; {streamer.cmode} {streamer.cmpos} {events[-15:]}")
+            sys.stderr.write(f"waited in vain; {streamer.cmode} {streamer.cmpos} {events[-15:]}\n")
+            sys.stderr.flush()
+            os._exit(1)  # its threads would go on for ever
         time.sleep(0.01)
 
 
@@ -36,6 +41,8 @@ if "refused" in sys.argv:
     until(lambda: abs(streamer.cmpos[0] - place) > 1.0)
     streamer.softreset()
     time.sleep(0.5)
+    streamer.killalarm()  # of a reset in motion, for who comes next
+    time.sleep(0.2)
     streamer.poll_stop()
     streamer.disconnect()
     raise SystemExit
@@ -73,4 +80,13 @@ until(lambda: streamer.cmode == "Idle")
 found["unlocked"] = streamer.cmode
 streamer.poll_stop()
 streamer.disconnect()
+found["round_trips"] = []  # [s], of a status, which the library asks for in a rhythm of its own
+with Path(sys.argv[1]).open("r+b", buffering=0) as line:
+    tty.setraw(line)
+    for _ in range(200):
+        begin, answer = time.perf_counter(), b""
+        line.write(b"?")
+        while not answer.endswith(b">\r\n"):
+            answer += line.read(1)
+        found["round_trips"].append(time.perf_counter() - begin)
 print(json.dumps(found))

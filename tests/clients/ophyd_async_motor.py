@@ -36,10 +36,11 @@ async def moves():
     await motor.stop(success=True)
     await asyncio.sleep(0.5)
     found["stopped"] = await motor.user_readback.get_value()
-    begin = time.perf_counter()
-    for _ in range(100):
+    found["round_trips"] = []  # [s]
+    for _ in range(200):
+        begin = time.perf_counter()
         await motor.user_readback.get_value()
-    found["round_trip_ms"] = (time.perf_counter() - begin) * 10
+        found["round_trips"].append(time.perf_counter() - begin)
 
 
 in_loop(moves())

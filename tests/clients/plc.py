@@ -1,6 +1,5 @@
 """What a PLC does, in twenty lines: heartbeat, target, command, sequence number, acknowledgement."""
 
-import json
 import sys
 
 from pymodbus.client import ModbusTcpClient
@@ -24,6 +23,7 @@ def command(number, target=0):
     return result, reason
 
 
-found = {"enable": command(1), "move": command(7, 45_000)}
+print("enable:", *command(1))
+print("move:", *command(7, 45_000))
 high, low = plc.read_holding_registers(16, count=2).registers
-print(json.dumps(found | {"position": high << 16 | low}))
+print("at", round(high << 16 | low, -2), "counts")

@@ -53,8 +53,9 @@ tell("MOVE:ABS 300")
 time.sleep(0.15)
 tell("*RST")
 found["stopped"] = float(ask("POS?"))
-begin = time.perf_counter()
+found["round_trips"] = []  # [s]
 for _ in range(200):
+    begin = time.perf_counter()
     ask("POS?")
-found["round_trip_ms"] = (time.perf_counter() - begin) / 200 * 1e3
+    found["round_trips"].append(time.perf_counter() - begin)
 print(json.dumps(found))

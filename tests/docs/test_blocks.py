@@ -2,7 +2,8 @@
 
 A page's blocks run in the order of the text in one folder of their own (see runner.py for the kinds). A block that
 installs, or runs the whole test-suite, cannot run inside it; it is preceded by `<!-- checked-by: make NAME -->` and
-`.ci/run` runs that target. The last tests here see to it that the mark is used for nothing else.
+`.ci/run` runs that target. The last tests here see to it that the mark is used for nothing else. A block behind
+`<!-- session -->` is run by tests/page_session.py, with programs of other people.
 """
 
 import re
@@ -26,7 +27,7 @@ CODE_DIRECTIVES = {
     "{testcode}",
     "{parsed-literal}",
 }
-MARKS = {"file", "checked-by"}
+MARKS = {"file", "checked-by", "session"}
 # What a block may hold, besides `make` lines, when .ci/run checks it in place of this harness.
 INSTALLING = re.compile(r"(git clone|cd|(sudo )?apt install|\S*python3? -m venv|source|\S*pip install|\S*pytest)\b.*")
 
@@ -46,7 +47,7 @@ def left_to(block: Block) -> list[str]:
 def test_blocks_of_a_page_do_what_it_says(page, tmp_path):
     runner = PageRunner(tmp_path)
     for block in blocks_of(page):
-        if "checked-by" not in block.marks:
+        if not {"checked-by", "session"} & set(block.marks):  # a session is run by test_faces, with its clients
             runner.run(block)
 
 

@@ -43,9 +43,9 @@ MODBUS = "Serve registers over Modbus TCP; loopback unless a host is named, as f
 SCPI = 'Take lines in the style of SCPI, on TCP, or with "pty" on a terminal.'
 VIEWER = "Print a second link, for somebody who only looks, and may stop."
 WORD = (
-    "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home; of the position "
-    "table: positions, teach, edit, rename, forget, undo, redo, export, import; job, pause, resume; inject, faults; "
-    "link: to the panel."
+    "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home; selector: who may "
+    "command, both, local or remote; of the position table: positions, teach, edit, rename, forget, undo, redo, "
+    "export, import; job, pause, resume; inject, faults; link: to the panel."
 )
 
 

@@ -8,13 +8,14 @@ from typing import Any
 
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 # caproto has no types for its properties.
-from caproto import AlarmSeverity, AlarmStatus
+from caproto import AccessRights, AlarmSeverity, AlarmStatus, ChannelDouble
 from caproto.asyncio.server import Context
 from caproto.server import PVGroup, pvproperty
 
 from detent.errors import DetentError
 from detent.faces.motor import Motor, name_of
-from detent.faces.service import Desk
+from detent.faces.service import AxisService, Desk
+from detent.faces.signals import Signals
 
 PORT = 5064
 SHOWN = 0.02  # until what has changed is at its clients: a put is complete behind that [s]
@@ -25,11 +26,50 @@ class Record(PVGroup):
 
     motor = pvproperty(value=0.0, name="", record="motor", precision=4)
     trust = pvproperty(value="", name=":trust", max_length=16, read_only=True)
+    selector = pvproperty(value="", name=":selector", max_length=16, read_only=True)
     state = pvproperty(value="", name=":state", max_length=40, read_only=True)
     fault = pvproperty(value=0, name=":fault", read_only=True)
     fault_text = pvproperty(value="", name=":fault_text", max_length=240, read_only=True)
     sample = pvproperty(value="", name=":sample", max_length=240, read_only=True)
     effort = pvproperty(value=0.0, name=":effort", read_only=True)
+
+
+class Signal(ChannelDouble):
+    """A channel of the scope; it is asked for while somebody monitors it, or reads it."""
+
+    def __init__(self, signals: Signals, channel: str) -> None:
+        super().__init__(value=0.0, units=signals.units[channel], precision=9)
+        self._signals, self._channel = signals, channel
+
+    async def subscribe(self, queue: Any, sub_spec: Any, sub: Any) -> None:
+        """Somebody monitors it."""
+        self._signals.look(self._channel, (id(queue), sub_spec))
+        await self.show(*await self._signals.once(self._channel))
+        await super().subscribe(queue, sub_spec, sub)
+
+    async def unsubscribe(self, queue: Any, sub_spec: Any) -> None:
+        """No more."""
+        self._signals.leave(self._channel, (id(queue), sub_spec))
+        await super().unsubscribe(queue, sub_spec)
+
+    async def read(self, data_type: Any) -> Any:
+        """Somebody reads it: what it is now."""
+        await self.show(*await self._signals.once(self._channel))
+        return await super().read(data_type)
+
+    async def show(self, value: float, wrong: str) -> None:
+        """Tell clients, where it is new."""
+        severity, status = (
+            (AlarmSeverity.INVALID_ALARM, AlarmStatus.READ) if wrong else (AlarmSeverity.NO_ALARM, AlarmStatus.NO_ALARM)
+        )
+        alarm: Any = self.alarm
+        if value != self.value or severity != alarm.severity:
+            await self.write(self.value if wrong else value, verify_value=False, severity=severity, status=status)
+
+    def check_access(self, hostname: str, username: str) -> AccessRights:
+        """Nobody puts to what is measured."""
+        del hostname, username
+        return AccessRights.READ
 
 
 class Served:
@@ -104,6 +144,21 @@ class Served:
             await asyncio.sleep(SHOWN)
 
 
+async def served_of(desk: Desk, name: str, axis: AxisService) -> dict[str, Any]:
+    """PVs of an axis, by name, which are kept up to date."""
+    served = Served(name)
+    motor = Motor(axis, served.show)
+    served.attach(motor)
+    await served.begin(motor)
+    shown: dict[str, Signal] = {}
+    signals = Signals(axis, lambda channel, value, wrong: shown[channel].show(value, wrong))
+    shown |= {channel: Signal(signals, channel) for channel in signals.units}
+    for work in (motor.follow(), served.follow(motor), signals.follow()):
+        desk.keep(asyncio.ensure_future(work))
+    own = {name + signals.name_of(channel): one for channel, one in shown.items()}
+    return own | served.group.pvdb  # of two of one name the record's own
+
+
 async def serve(desk: Desk, address: str) -> list[str]:
     """Serve; gives what a client needs."""
     for logger in ("caproto", "caproto.circ", "caproto.ctx", "caproto.bcast", "caproto.ch"):
@@ -117,13 +172,7 @@ async def serve(desk: Desk, address: str) -> list[str]:
     names, pvs = list[str](), dict[str, Any]()
     for axis in await desk.open():
         names.append(f"{name}:{axis.motor}" if axis.motor else name)
-        served = Served(names[-1])
-        motor = Motor(axis, served.show)
-        served.attach(motor)
-        await served.begin(motor)
-        pvs |= served.group.pvdb
-        for work in (motor.follow(), served.follow(motor)):
-            desk.keep(asyncio.ensure_future(work))
+        pvs |= await served_of(desk, names[-1], axis)
     context = Context(pvs, [host])
     desk.keep(asyncio.ensure_future(context.run()))
     while not context.port:  # noqa: ASYNC110 - caproto tells it nobody

@@ -5,15 +5,17 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from importlib.metadata import version
 from typing import Any
 
-from detent.errors import DetentError
+from detent.errors import ON_LOCAL, DetentError
 from detent.faces.service import BEYOND, READ_ONLY, UNREFERENCED, AxisService, Desk, NotDoneError
 from detent.faces.talk import Send, Talk, serve_lines
 
 PORT = 50000
-SYNTAX, UNKNOWN, UNMOVABLE, OUTSIDE, TOO_FAST, STOPPED, NO_AXIS, RANGE, PROTECTED = 1, 2, 5, 7, 8, 10, 15, 17, 63
+SYNTAX, UNKNOWN, UNMOVABLE, OUTSIDE, TOO_FAST, STOPPED, NO_AXIS, BY_HAND, PROTECTED = 1, 2, 5, 7, 8, 10, 15, 51, 63
 """Numbers of errors, as PI's manuals have them."""
 MOTION, READY, STATUS, HALT = 5, 7, 4, 24  # characters that stand for themselves
-IN_ERRORS = {BEYOND: OUTSIDE, UNREFERENCED: UNMOVABLE, 101: UNMOVABLE, 102: UNMOVABLE, READ_ONLY: PROTECTED}
+IN_ERRORS = {
+    BEYOND: OUTSIDE, UNREFERENCED: UNMOVABLE, 101: UNMOVABLE, 102: UNMOVABLE, READ_ONLY: PROTECTED, ON_LOCAL: BY_HAND,
+}  # fmt: skip
 
 
 class GcsError(Exception):

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 from detent.errors import DetentError
-from detent.faces.service import READ_ONLY, AxisService, Desk, NotDoneError
+from detent.faces.service import NOT_YOURS, AxisService, Desk, NotDoneError
 from detent.faces.talk import Send, Talk, serve_lines
 
 PORT = 2300
@@ -221,7 +221,7 @@ class Grbl(Talk):
         except GrblError as error:
             self.send(f"error:{error.code}")
         except NotDoneError as error:
-            self.send(f"error:{LOCKED if error.code in (READ_ONLY, 43, 101, 102) else UNSUPPORTED}")
+            self.send(f"error:{LOCKED if error.code in (*NOT_YOURS, 101, 102) else UNSUPPORTED}")
         except DetentError:
             self.send(f"error:{BAD_NUMBER}")
         else:
@@ -359,7 +359,7 @@ class Grbl(Talk):
                 machine.alarm = SOFT_LIMIT
                 self.send(f"ALARM:{SOFT_LIMIT}")
                 raise GrblError(TRAVEL)
-        if any(axis.is_others for axis in machine.axes):
+        if not all(axis.may_command for axis in machine.axes):
             raise GrblError(LOCKED)
         for axis in machine.axes:
             await axis.enable()

@@ -77,6 +77,7 @@ REGISTERS = (
 STATUS_BITS = (
     "ready", "enabled", "fault", "moving", "in window", "position known", "at lower limit", "at upper limit",
     "first motion confirmed", "heartbeat seen", "commanded from here", "somebody else commands",
+    "selector on local",
 )
 # fmt: on
 FIRST_WRITABLE, SEQUENCE, HEARTBEAT, SIZE = 40, 46, 40, 47
@@ -138,6 +139,7 @@ class Slave:
         bits = (
             s["ready"], axis.enabled, axis.fault != 0, axis.moving, s["in_window"], axis.homed, axis.at_end == "lower",
             axis.at_end == "upper", s["confirmed"], self._is_heard(), mine, s["client"] != 0 and not mine,
+            s["selector"] == "local",
         )  # fmt: skip
         return sum(bool(is_set) << bit for bit, is_set in enumerate(bits))
 

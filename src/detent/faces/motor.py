@@ -314,7 +314,8 @@ class Motor:
         """Names behind the record's, with what they show."""
         axis = self.axis
         return {
-            "trust": axis.status["trust"], "state": axis.status["state"], "fault": axis.fault,
+            "trust": axis.status["trust"], "selector": axis.status["selector"],
+            "state": axis.status["state"], "fault": axis.fault,
             "fault_text": axis.fault_text[:200], "sample": str(axis.sample),
             "effort": float(axis.status["effort"] or 0.0),
         }  # fmt: skip

@@ -210,7 +210,7 @@ class Node:
     def status(self) -> int:
         """The status word."""
         axis = self.axis
-        word = c.WORDS[self.state] | VOLTAGE | (REMOTE if axis.commands and not axis.is_others else 0)
+        word = c.WORDS[self.state] | VOLTAGE | (REMOTE if axis.may_command else 0)
         word |= LIMIT if self._limited or axis.at_end else 0
         if self._mode == POSITION:
             idle = self.set_points.active is None
@@ -331,7 +331,7 @@ class Node:
 
     async def _order(self, order: int) -> None:
         """One of the orders of a control word; a quick stop is taken from everybody."""
-        if order == HALT_QUICKLY and (self.axis.is_others or not self.axis.commands):
+        if order == HALT_QUICKLY and not self.axis.may_command:
             await self.axis.stop()
         else:
             await self.axis.do("order", order)

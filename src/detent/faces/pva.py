@@ -14,6 +14,7 @@ from p4p.server.asyncio import SharedPV
 from detent.errors import DetentError
 from detent.faces.motor import Motor, name_of
 from detent.faces.service import Desk
+from detent.faces.signals import Signals
 
 PORT = 5075
 MENUS = {
@@ -46,6 +47,47 @@ class Put:
         del pv
 
 
+class Signal:
+    """A channel of the scope: its PV has a value, and costs something, while somebody is connected to it."""
+
+    def __init__(self, signals: Signals, channel: str) -> None:
+        self._signals, self._channel, self._shown = signals, channel, (0.0, "")
+        self.pv = SharedPV(handler=self, nt=NTScalar("d", display=True))
+
+    async def onFirstConnect(self, pv: Any) -> None:  # noqa: N802 - as p4p calls it
+        """Somebody has come."""
+        self._signals.look(self._channel, self)
+        self._shown = await self._signals.once(self._channel)
+        pv.open(self._whole())
+
+    async def onLastDisconnect(self, pv: Any) -> None:  # noqa: N802 - as p4p calls it
+        """Nobody is left."""
+        self._signals.leave(self._channel, self)
+        pv.close()
+
+    async def show(self, value: float, wrong: str) -> None:
+        """Tell clients, where it is new."""
+        shown = (self._shown[0] if wrong else value), wrong
+        if shown != self._shown and self.pv.isOpen():
+            self._shown = shown
+            self.pv.post(self._whole())
+
+    def _whole(self) -> dict[str, Any]:
+        value, wrong = self._shown
+        unit, about = self._signals.units[self._channel], self._signals.about[self._channel]
+        severity = {"severity": 3, "status": 3} if wrong else {"severity": 0, "status": 0}  # invalid, of the record
+        return {
+            "value": value, "timeStamp": stamp(), "alarm": {**severity, "message": wrong[:200]},
+            "display": {"units": unit, "description": about},
+        }  # fmt: skip
+
+
+def stamp() -> dict[str, int]:
+    """The time of day."""
+    now = time.time()
+    return {"secondsPastEpoch": int(now), "nanoseconds": int(now % 1 * 1e9)}
+
+
 class Served:
     """PVs of a record."""
 
@@ -53,6 +95,7 @@ class Served:
         self._name, self.provider = name, StaticProvider(name)
         self.pvs: dict[str, Any] = {}
         self.motor: Motor
+        self.signals: Signals
 
     def open(self, motor: Motor) -> None:
         """Make a PV of every field."""
@@ -60,6 +103,13 @@ class Served:
         for name, value in motor.fields.items():
             self._add(f".{name}", name, value, Put(motor, name) if name in motor.actions else None)
         self.provider.add(self._name, self.pvs["VAL"])
+        shown: dict[str, Signal] = {}
+        self.signals = Signals(motor.axis, lambda channel, value, wrong: shown[channel].show(value, wrong))
+        own = {f":{name}" for name in motor.extras()}  # of two of one name the record's own
+        for channel in self.signals.units:
+            if (behind := self.signals.name_of(channel)) not in own:
+                shown[channel] = Signal(self.signals, channel)
+                self.provider.add(self._name + behind, shown[channel].pv)
         for name, value in motor.extras().items():
             self._add(f":{name}", f":{name}", value, None)
 
@@ -75,9 +125,8 @@ class Served:
 
     def _whole(self, name: str, value: Any) -> dict[str, Any]:
         """A value with its unit, limits, alarm and time."""
-        now = time.time()
         found: dict[str, Any] = {
-            "value": value, "timeStamp": {"secondsPastEpoch": int(now), "nanoseconds": int(now % 1 * 1e9)},
+            "value": value, "timeStamp": stamp(),
             "alarm": {"severity": self.motor.severity, "status": self.motor.status and 2, "message": ""},
         }  # fmt: skip
         if type(value) is not str:
@@ -117,7 +166,7 @@ async def serve(desk: Desk, address: str) -> list[str]:
         motor = Motor(axis, served.show)
         served.open(motor)
         providers.append(served.provider)
-        for work in (motor.follow(), served.follow()):
+        for work in (motor.follow(), served.follow(), served.signals.follow()):
             desk.keep(asyncio.ensure_future(work))
     conf = {
         "EPICS_PVAS_INTF_ADDR_LIST": host, "EPICS_PVAS_SERVER_PORT": str(port),

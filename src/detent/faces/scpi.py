@@ -7,21 +7,25 @@ have a long and a short form, ``POSition?``; several commands in a line have ``;
 import asyncio
 import re
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.metadata import version
+from inspect import isawaitable
 from typing import Any
 
-from detent.errors import DetentError
+from detent.errors import ON_LOCAL, DetentError
 from detent.faces.service import BEYOND, READ_ONLY, AxisService, Desk, NotDoneError
 from detent.faces.talk import Send, Talk, serve_lines
 
 PORT = 5025
 MOST_ERRORS = 30
+NO_NUMBER = 9.91e37  # as SCPI writes it
 POWER_ON, COMMAND, EXECUTION, DEVICE, COMPLETE = 128, 32, 16, 8, 1  # bits of the event status
 QUEUE, EVENTS = 4, 32  # bits of the status byte
 TEXTS = {
     0: "No error", -108: "Parameter not allowed", -109: "Missing parameter", -113: "Undefined header",
-    -104: "Data type error", -200: "Execution error", -203: "Command protected", -222: "Data out of range",
+    -104: "Data type error", -200: "Execution error", -201: "Invalid while in local",
+    -203: "Command protected", -222: "Data out of range",
     -350: "Queue overflow",
 }  # fmt: skip
 
@@ -32,21 +36,6 @@ class ScpiError(Exception):
     def __init__(self, code: int, more: str = "") -> None:
         self.code, self.more = code, more
         super().__init__(code)
-
-
-Handler = Callable[["Scpi", list[str]], Awaitable[str | None]]
-COMMANDS: dict[str, tuple[Handler, int, int, str]] = {}
-"""By its header: what does it, least and most parameters, and what it is for."""
-
-
-def command(header: str, about: str, least: int = 0, most: int | None = None) -> Callable[[Handler], Handler]:
-    """Declare a command."""
-
-    def declare(handler: Handler) -> Handler:
-        COMMANDS[header] = (handler, least, least if most is None else most, about)
-        return handler
-
-    return declare
 
 
 def pattern_of(header: str) -> re.Pattern[str]:
@@ -101,12 +90,16 @@ class Scpi(Talk):
 
     async def _do(self, part: str) -> str | None:
         header, _, said = part.partition(" ")
-        for pattern, (handler, least, most, _about) in PATTERNS:
+        values = [one.strip() for one in said.split(",")] if said.strip() else []
+        for pattern, command in PATTERNS:
             if pattern.fullmatch(header):
-                values = [one.strip() for one in said.split(",")] if said.strip() else []
-                if not least <= len(values) <= most:
-                    raise ScpiError(-109 if len(values) < least else -108, header)
-                return await handler(self, values)
+                if not command.least <= len(values) <= max(command.least, command.most):
+                    raise ScpiError(-109 if len(values) < command.least else -108, header)
+                if command.fresh:
+                    await self.axis.refresh()
+                told = command.done(self, values)
+                told = await told if isawaitable(told) else told
+                return None if told is None else str(told)
         raise ScpiError(-113, header[:40])
 
     def _note(self, code: int, more: str = "") -> None:
@@ -139,10 +132,44 @@ class Scpi(Talk):
             self._events |= COMPLETE
             self._tell_complete = False
 
-    async def rest(self) -> None:
+    async def move(self, word: str, values: list[str]) -> None:
+        """Begin a move: where to, or how far, and perhaps how fast."""
+        await self.overlap(word, self.value(values[0]), self.share(values))
+
+    async def jog(self, velocity: str) -> None:
+        """Begin a jog, and keep it."""
+        await self.overlap("jog", self.value(velocity, "per second"))
+        self.axis.keep()
+
+    async def trust(self, level: str) -> None:
+        """Say how far the position is to be trusted."""
+        if level not in ("0", "1", "2"):
+            raise ScpiError(-222, f"{level}: 0, 1 or 2")
+        await self.axis.do("trust", int(level))
+
+    async def restart(self) -> None:
+        """Stop, and be as at the beginning."""
+        self.clear()
+        self.axis = self.axes[0]
+        await self.stop()
+
+    def select(self, name: str) -> None:
+        """What follows is about an axis."""
+        named = {axis.motor: axis for axis in self.axes}
+        if name not in named:
+            raise ScpiError(-222, f"{name:.20}: {', '.join(named)}")
+        self.axis = named[name]
+
+    async def rest(self, answer: str | None = None) -> str | None:
         """Wait until all that was begun has ended."""
         while self._pending:
             await asyncio.wait(self._pending)
+        return answer
+
+    def identity(self) -> str:
+        """Who this is."""
+        about = self.axis.about
+        return f"detent,{about['name'].replace(',', ' ')},{about['method']},{version('detent')}"
 
     def value(self, text: str, per_second: str = "") -> object:
         """A number in units of the face, or a quantity with a unit of its own, as the axis takes it."""
@@ -201,243 +228,94 @@ class Scpi(Talk):
 
 def code_of(error: NotDoneError) -> int:
     """Number of the error that a command has ended in."""
-    return {READ_ONLY: -203, BEYOND: -222}.get(error.code, -200)
-
-
-# ---- IEEE 488.2
-
-
-@command("*IDN?", "maker, name of the axis, its method, version")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return f"detent,{talk.axis.about['name'].replace(',', ' ')},{talk.axis.about['method']},{version('detent')}"
-
-
-@command("*CLS", "forget errors and events")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    talk.clear()
-
-
-@command("*ESR?", "event status: 128 power on, 32 command, 16 execution, 8 device error, 1 complete")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return str(talk.events())
-
-
-@command("*ESE", "events that show in the status byte", 1)
-async def _(talk: Scpi, values: list[str]) -> None:
-    talk.mask(values[0], "enabled_events")
-
-
-@command("*ESE?", "which these are")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return str(talk.enabled_events)
-
-
-@command("*SRE", "bits of the status byte that ask for service; nobody is asked", 1)
-async def _(talk: Scpi, values: list[str]) -> None:
-    talk.mask(values[0], "service")
-
-
-@command("*SRE?", "which these are")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return str(talk.service)
-
-
-@command("*STB?", "status byte: 4 errors wait, 32 an enabled event has come")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return str(talk.status_byte())
-
-
-@command("*OPC", "set the bit of completion once all motions have ended")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    talk.complete_later()
-
-
-@command("*OPC?", "1, once all motions have ended")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    await talk.rest()
-    return "1"
-
-
-@command("*WAI", "take the next command once all motions have ended")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.rest()
-
-
-@command("*RST", "stop; errors and settings of the client are those at its beginning")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    talk.clear()
-    talk.axis = talk.axes[0]
-    await talk.stop()
-
-
-@command("*TST?", "0 where no fault stands, else its number")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return str(talk.axis.fault)
-
-
-# ---- the axis
-
-
-@command("ENABle", "take torque; the first motion of a simulated axis is confirmed with it")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.axis.enable()
-
-
-@command("DISable", "take the torque away")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.axis.do("disable")
-
-
-@command("CONFirm", "the first motion went as expected: full speed")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.axis.do("confirm")
-
-
-@command("STOP", "come to rest, and hold: all axes")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.stop()
-
-
-@command("INSTrument:CATalog?", "names of the axes, of a file with several motors")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return ",".join(f'"{axis.motor}"' for axis in talk.axes)
-
-
-@command("INSTrument:SELect", "the axis that what follows is about: its name, quoted or not", 1)
-async def _(talk: Scpi, values: list[str]) -> None:
-    name = values[0].strip("\"'")
-    named = [axis for axis in talk.axes if axis.motor == name]
-    if not named:
-        raise ScpiError(-222, f"{name:.20}: {', '.join(axis.motor for axis in talk.axes)}")
-    talk.axis = named[0]
-
-
-@command("INSTrument:SELect?", "which that is")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return f'"{talk.axis.motor}"'
-
-
-@command("RESet", "leave a fault")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.axis.do("reset")
-
-
-@command("TAKE", "take over the command")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.axis.do("take")
-
-
-@command("LEAVE", "give it back")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.axis.do("leave")
-
-
-@command("HOME", "find the reference")
-async def _(talk: Scpi, _values: list[str]) -> None:
-    await talk.overlap("home")
-
-
-@command("MOVE:ABSolute", "go to a position, at a speed [unit/s]", 1, 2)
-async def _(talk: Scpi, values: list[str]) -> None:
-    await talk.overlap("move_to", talk.value(values[0]), talk.share(values))
-
-
-@command("MOVE:RELative", "go by a way, at a speed [unit/s]", 1, 2)
-async def _(talk: Scpi, values: list[str]) -> None:
-    await talk.overlap("move_by", talk.value(values[0]), talk.share(values))
-
-
-@command("JOG", "move at a velocity [unit/s] until STOP, or until the connection ends", 1)
-async def _(talk: Scpi, values: list[str]) -> None:
-    await talk.overlap("jog", talk.value(values[0], "per second"))
-    talk.axis.keep()
-
-
-@command("TRUSt", "0 position unknown, 1 restored, 2 referenced", 1)
-async def _(talk: Scpi, values: list[str]) -> None:
-    if values[0] not in ("0", "1", "2"):
-        raise ScpiError(-222, f"{values[0]}: 0, 1 or 2")
-    await talk.axis.do("trust", int(values[0]))
-
-
-@command("POSition?", "position")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    await talk.axis.refresh()
-    return shown(talk.axis.position)
-
-
-@command("VELocity?", "velocity [unit/s]")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    await talk.axis.refresh()
-    return shown(talk.axis.velocity)
-
-
-@command("STATe?", "state, as CiA 402 names it")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    await talk.axis.refresh()
-    return f'"{talk.axis.status["state"]}"'
-
-
-@command("MOVing?", "1 until what is under way is done")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    await talk.axis.refresh()
-    return str(int(talk.axis.moving))
-
-
-@command("TRUSt?", "trust in the position: unknown, restored, referenced")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return f'"{talk.axis.status["trust"]}"'
-
-
-@command("FAULt?", "number and sentence of the fault")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    await talk.axis.refresh()
-    text = talk.axis.fault_text.replace('"', "'")
-    return f'{talk.axis.fault},"{text}"'
-
-
-@command("SAMPle?", "number of a period, and in it state, position, trust and fault, as all faces show them")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return str(talk.axis.sample)
-
-
-@command("LIMits?", "soft limits; two numbers that are none where there are none")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    low, high = talk.axis.limits or (9.91e37, 9.91e37)  # not a number, as SCPI writes it
-    return f"{shown(low)},{shown(high)}"
-
-
-@command("SPEed:MAXimum?", "largest speed [unit/s]")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return shown(talk.axis.speed)
-
-
-@command("UNIT?", "unit of positions")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return talk.axis.unit.upper()
-
-
-@command("SYSTem:ERRor?", "the oldest error, which leaves the queue")
-async def _(talk: Scpi, _values: list[str]) -> str:
-    return talk.error()
-
-
-@command("SYSTem:VERSion?", "year of the SCPI that headers follow")
-async def _(_talk: Scpi, _values: list[str]) -> str:
-    return "1999.0"
-
-
-@command("HELP?", "all headers")
-async def _(_talk: Scpi, _values: list[str]) -> str:
-    return ",".join(COMMANDS)
-
-
-PATTERNS = [(pattern_of(header), done) for header, done in COMMANDS.items()]
-
-
-def shown(value: float) -> str:
-    """A number of the axis, without what its unit has left behind the twelfth digit."""
-    return f"{value:.12g}"
+    return {READ_ONLY: -203, ON_LOCAL: -201, BEYOND: -222}.get(error.code, -200)
+
+
+def shown(*values: float) -> str:
+    """Numbers of the axis, without what its unit has left behind the twelfth digit."""
+    return ",".join(f"{value:.12g}" for value in values)
+
+
+def quoted(text: str) -> str:
+    """A text as an answer."""
+    return '"' + text.replace('"', "'") + '"'
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A header, what it is for, what it does and answers, and how many parameters it takes."""
+
+    header: str
+    about: str
+    done: Callable[[Scpi, list[str]], Any]
+    least: int = 0
+    most: int = 0
+    fresh: bool = False  # it shows the axis now, not as it was up to a fiftieth of a second ago
+
+
+IEEE_488_2: tuple[Command, ...] = (
+    Command("*IDN?", "maker, name of the axis, its method, version", lambda t, _: t.identity()),
+    Command("*CLS", "forget errors and events", lambda t, _: t.clear()),
+    Command("*ESR?", "event status: 128 power on, 32 command, 16 execution, 8 device error, 1 complete",
+            lambda t, _: t.events()),
+    Command("*ESE", "events that show in the status byte", lambda t, v: t.mask(v[0], "enabled_events"), 1),
+    Command("*ESE?", "which these are", lambda t, _: t.enabled_events),
+    Command("*SRE", "bits of the status byte that ask for service; nobody is asked",
+            lambda t, v: t.mask(v[0], "service"), 1),
+    Command("*SRE?", "which these are", lambda t, _: t.service),
+    Command("*STB?", "status byte: 4 errors wait, 32 an enabled event has come", lambda t, _: t.status_byte()),
+    Command("*OPC", "set the bit of completion once all motions have ended", lambda t, _: t.complete_later()),
+    Command("*OPC?", "1, once all motions have ended", lambda t, _: t.rest(answer="1")),
+    Command("*WAI", "take the next command once all motions have ended", lambda t, _: t.rest()),
+    Command("*RST", "stop; errors and settings of the client are those at its beginning", lambda t, _: t.restart()),
+    Command("*TST?", "0 where no fault stands, else its number", lambda t, _: t.axis.fault),
+)  # fmt: skip
+ACTIONS: tuple[Command, ...] = (
+    Command("ENABle", "take torque; the first motion of a simulated axis is confirmed with it",
+            lambda t, _: t.axis.enable()),
+    Command("DISable", "take the torque away", lambda t, _: t.axis.do("disable")),
+    Command("CONFirm", "the first motion went as expected: full speed", lambda t, _: t.axis.do("confirm")),
+    Command("STOP", "come to rest, and hold: all axes", lambda t, _: t.stop()),
+    Command("INSTrument:SELect", "the axis that what follows is about: its name, quoted or not",
+            lambda t, v: t.select(v[0].strip("\"'")), 1),
+    Command("RESet", "leave a fault", lambda t, _: t.axis.do("reset")),
+    Command("TAKE", "take over the command", lambda t, _: t.axis.do("take")),
+    Command("LEAVE", "give it back", lambda t, _: t.axis.do("leave")),
+    Command("HOME", "find the reference", lambda t, _: t.overlap("home")),
+    Command("MOVE:ABSolute", "go to a position, at a speed [unit/s]", lambda t, v: t.move("move_to", v), 1, 2),
+    Command("MOVE:RELative", "go by a way, at a speed [unit/s]", lambda t, v: t.move("move_by", v), 1, 2),
+    Command("JOG", "move at a velocity [unit/s] until STOP, or until the connection ends", lambda t, v: t.jog(v[0]), 1),
+    Command("TRUSt", "0 position unknown, 1 restored, 2 referenced", lambda t, v: t.trust(v[0]), 1),
+    Command("SYSTem:REMote", "only faces command, panel and programs do not",
+            lambda t, _: t.axis.do("selector", "remote")),
+    Command("SYSTem:LOCal", "they command again, too", lambda t, _: t.axis.do("selector", "both")),
+)  # fmt: skip
+QUESTIONS: tuple[Command, ...] = (
+    Command("INSTrument:CATalog?", "names of the axes, of a file with several motors",
+            lambda t, _: ",".join(quoted(axis.motor) for axis in t.axes)),
+    Command("INSTrument:SELect?", "which one is selected", lambda t, _: quoted(t.axis.motor)),
+    Command("POSition?", "position", lambda t, _: shown(t.axis.position), fresh=True),
+    Command("VELocity?", "velocity [unit/s]", lambda t, _: shown(t.axis.velocity), fresh=True),
+    Command("STATe?", "state, as CiA 402 names it", lambda t, _: quoted(t.axis.status["state"]), fresh=True),
+    Command("MOVing?", "1 until what is under way is done", lambda t, _: int(t.axis.moving), fresh=True),
+    Command("TRUSt?", "trust in the position: unknown, restored, referenced",
+            lambda t, _: quoted(t.axis.status["trust"])),
+    Command("FAULt?", "number and sentence of the fault",
+            lambda t, _: f"{t.axis.fault},{quoted(t.axis.fault_text)}", fresh=True),
+    Command("SAMPle?", "number of a period, and in it state, position, trust and fault, as all faces show them",
+            lambda t, _: t.axis.sample),
+    Command("LIMits?", "soft limits; two numbers that are none where there are none",
+            lambda t, _: shown(*(t.axis.limits or (NO_NUMBER, NO_NUMBER)))),
+    Command("SPEed:MAXimum?", "largest speed [unit/s]", lambda t, _: shown(t.axis.speed)),
+    Command("UNIT?", "unit of positions", lambda t, _: t.axis.unit.upper()),
+    Command("SYSTem:SELector?", "who may command: both, local or remote",
+            lambda t, _: quoted(t.axis.status["selector"]), fresh=True),
+    Command("SYSTem:ERRor?", "the oldest error, which leaves the queue", lambda t, _: t.error()),
+    Command("SYSTem:VERSion?", "year of the SCPI that headers follow", lambda _, __: "1999.0"),
+    Command("HELP?", "all headers", lambda _, __: ",".join(one.header for one in COMMANDS)),
+)  # fmt: skip
+COMMANDS: tuple[Command, ...] = (*IEEE_488_2, *ACTIONS, *QUESTIONS)
+PATTERNS: list[tuple[re.Pattern[str], Command]] = [(pattern_of(one.header), one) for one in COMMANDS]
 
 
 async def serve(desk: Desk, address: str) -> list[str]:

@@ -6,12 +6,12 @@ that does not depend on how many clients the face has, for they share the newest
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from detent.errors import AxisError, DetentError
+from detent.errors import ON_LOCAL, AxisError, DetentError
 from detent.operate.line import PATIENCE, Line
 
 RATE = 50.0  # samples that are shown in a second
@@ -20,6 +20,7 @@ KEEP = 0.05  # how often a jog is kept on behalf of who holds it [s]
 MOVES = "move to", "move by", "jog", "go", "home", "job"
 MOTIONS = "move_to", "move_by", "jog", "home", "stop"  # by the words that ask for them
 LEASE_LOST, SECOND, BEYOND, UNREFERENCED, READ_ONLY = 41, 43, 31, 35, 120
+NOT_YOURS = SECOND, READ_ONLY, ON_LOCAL  # refusals of who may not command, at all or now
 OPEN = "stop", "disable"  # to everyone, also where a face may only read
 USER_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / math.pi)}
 """Unit in which a face shows positions by that of the axis, and how many of it are one of that."""
@@ -76,7 +77,7 @@ class AxisService:
     @classmethod
     async def open(cls, channel: Path, who: str, motor: str = "", *, commands: bool = False) -> "AxisService":
         """Attach to an axis, under a name that its panel shows and its log keeps."""
-        line = await Line.open(channel, who)
+        line = await Line.open(channel, who, remote=True)
         service = cls(line, (await line.ask({"do": "describe"}))["describe"], motor, commands=commands)
         await line.ask({"do": "watch", "rate": RATE})
         await asyncio.wait_for(service._come.wait(), PATIENCE)
@@ -113,6 +114,15 @@ class AxisService:
     async def refresh(self) -> None:
         """The axis now, not as it was up to a fiftieth of a second ago."""
         self._take(await self._line.ask({"do": "status"}))
+
+    async def show(self, channels: Sequence[str]) -> None:
+        """Let the ring hold these channels of the scope; the status goes on to come."""
+        await self._line.ask({"do": "watch", "rate": RATE, "channels": list(channels)})
+
+    async def newest(self, channels: Sequence[str]) -> dict[str, Any]:
+        """Their newest rows, as the channel packs them."""
+        first = max(self.status["loop"]["periods"] - 1, 0)
+        return (await self._line.ask({"do": "scope", "channels": list(channels), "first": first}))["scope"]
 
     @property
     def sample(self) -> Sample:
@@ -187,6 +197,11 @@ class AxisService:
     def is_others(self) -> bool:
         """True while somebody else commands: what is asked here is refused."""
         return self.status["client"] not in (0, self._number)
+
+    @property
+    def may_command(self) -> bool:
+        """True while what is asked here is done: nobody else commands, and the selector does not stand on local."""
+        return self.commands and not self.is_others and self.status["selector"] != "local"
 
     def share(self, speed: float) -> float:
         """Share of the largest speed that a speed is, within what a command takes."""

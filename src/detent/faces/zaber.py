@@ -7,12 +7,14 @@ can drive it without identifying it, in native units.
 import asyncio
 
 from detent.errors import DetentError
-from detent.faces.service import BEYOND, UNREFERENCED, AxisService, Desk, NotDoneError
+from detent.faces.service import BEYOND, NOT_YOURS, UNREFERENCED, AxisService, Desk, NotDoneError
 from detent.faces.talk import Send, Talk, serve_lines
 
 PORT = 55550
 SPEED_UNIT = 1.6384  # of a velocity in microsteps per second
-REJECTIONS = {BEYOND: "BADDATA", UNREFERENCED: "BADAXIS", 43: "REMOTE", 120: "REMOTE", 105: "BADCOMMAND"}
+REJECTIONS = {
+    BEYOND: "BADDATA", UNREFERENCED: "BADAXIS", 105: "BADCOMMAND", **dict.fromkeys(NOT_YOURS, "REMOTE"),
+}  # fmt: skip
 SETTINGS = (
     "pos", "limit.max", "limit.min", "maxspeed", "deviceid", "version", "system.serial", "system.axiscount",
     "comm.address", "comm.protocol", "comm.alert", "comm.checksum", "comm.word.size.max", "comm.packet.size.max",

@@ -93,6 +93,7 @@ class Client:
     number: int
     writer: asyncio.StreamWriter
     who: str
+    remote: bool = False  # a face: what it asks comes from elsewhere
     open: set[int] = field(default_factory=set[int])  # commands that have not ended
     told: set[int] = field(default_factory=set[int])  # those of them that stand in the log
     watch: asyncio.Future[None] | None = None
@@ -252,13 +253,19 @@ class Channel:
 
     def _command(self, do: str, asked: dict[str, Any], client: Client, who: str, known: dict[str, int]) -> int:
         value, speed = asked.get("value"), asked.get("speed", 1.0)
+        barred = self.session.barred(do, value, remote=client.remote)
         if isinstance(speed, bool) or not isinstance(speed, int | float) or abs(speed) > 1e300:
             raise DetentError(f"speed {speed!r:.60}: expected a number above 0 to 1, a share of the largest speed")
         try:
-            command = self.session.ask(do, value, float(speed), client=client.number, **known)
+            if barred:
+                command = self.session.host.settle(barred)
+            else:
+                command = self.session.ask(do, value, float(speed), client=client.number, **known)
         except BlockingIOError as error:
             raise DetentError("too many commands at once") from error
         client.open.add(command)
+        if do == "selector" and not barred:
+            self._stop_barred()
         if do not in UNTOLD and do not in LINES:
             self.lost = ""  # somebody goes on
         if do not in UNTOLD:
@@ -273,6 +280,15 @@ class Channel:
         """Set-points of a stream; no command, so that nothing of them stands in the log."""
         return self.session.points(stream, values, client=client.number, in_turn=in_turn, last=last)
 
+    def _stop_barred(self) -> None:
+        """The selector was turned: who may not command any more has its motion stopped, and the command taken."""
+        holder = self._clients.get(int(self.session.host.board.operation.client))
+        if holder is None or not self.session.barred("move_to", remote=holder.remote):
+            return
+        self.audit.note(holder.who, client=holder.number, note=f"the selector stands on {self.session.selector}")
+        with suppress(BlockingIOError):  # a full mailbox: it may still command nothing, and its lease runs out
+            self.session.ask("leave", client=holder.number)
+
     def _log(self, _client: Client) -> dict[str, Any]:
         """Who asked for what, and how that ended."""
         return self.audit.recent()
@@ -281,9 +297,9 @@ class Channel:
         """Something that happened at the client's, for the log."""
         self.audit.note(str(who)[:80] or client.who, client=client.number, note=str(what)[:200])
 
-    def _name(self, client: Client, who: object = "") -> str:
-        """A client says on whose behalf it asks."""
-        client.who = shown(str(who))[:80]
+    def _name(self, client: Client, who: object = "", *, remote: object = False) -> str:
+        """A client says on whose behalf it asks, and whether that comes from elsewhere."""
+        client.who, client.remote = shown(str(who))[:80], bool(remote)
         return client.who
 
     def _watch(self, client: Client, rate: object = 25.0, channels: object = ()) -> dict[str, Any]:

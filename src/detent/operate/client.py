@@ -196,6 +196,10 @@ class LiveAxis:
         """The first motion since enabling went as expected: full speed from now on."""
         return self.do("confirm", wait=wait)
 
+    def select(self, who: str) -> Command:
+        """Turn the selector: "both" lets all command, one at a time, "local" panel and programs, "remote" faces."""
+        return self.do("selector", who)
+
     def move_to(self, place: float | str, *, speed: float = 1.0, wait: bool = True) -> Command:
         """Go to a position, "120 mm" or a number [m]; `speed` is a share of the largest."""
         return self.do("move_to", place, speed, wait=wait)

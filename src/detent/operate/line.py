@@ -30,11 +30,11 @@ class Line:
         self._hearing = asyncio.ensure_future(self._hear())
 
     @classmethod
-    async def open(cls, path: Path, who: str) -> "Line":
-        """Attach to an axis."""
+    async def open(cls, path: Path, who: str, *, remote: bool = False) -> "Line":
+        """Attach to an axis; `remote`: for somebody who is elsewhere, as the selector has it."""
         reader, writer = await asyncio.open_unix_connection(path, limit=LONGEST)
         line = cls(reader, writer)
-        await line.ask({"do": "name", "who": who})
+        await line.ask({"do": "name", "who": who, "remote": remote})
         return line
 
     async def ask(self, message: dict[str, Any], tell: Tell | None = None) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any, cast
 from detent.control import operation as ops
 from detent.control.move_commands import LONGEST_PERIOD
 from detent.control.stream import AHEAD
-from detent.errors import NO_MARK, DetentError
+from detent.errors import NO_MARK, ON_LOCAL, ON_REMOTE, DetentError
 from detent.methods.method import Leg
 from detent.operate.faults import injection_of, injections
 from detent.operate.host import Host
@@ -23,6 +23,8 @@ from detent.units import format_quantity
 
 STEP = 2e-3  # how often an ending is looked for [s]
 LINES = ("stop", "disable")  # never refused
+ALWAYS = *LINES, "leave"  # whatever the selector says
+SELECTOR = "both", "local", "remote"  # who may command: all; panel and programs; faces. One of them at a time
 MOST_ROWS = 2048  # of the ring, in one answer
 LARGEST = 1 << 62  # number of a row
 COUNT = 1e-6  # where a method does not say what counts the position [m]
@@ -40,6 +42,7 @@ class Session:
         self.unit = host.axis.unit
         self._lock, self._left, self._places = threading.Lock(), threading.Event(), Places(host)
         self._jobs = threading.Lock()
+        self.selector = SELECTOR[0]
         self._signals = self._name_signals()
         if host.is_running:
             threading.Thread(target=host.supervised(self._keep_noting), name="notes", daemon=True).start()
@@ -57,6 +60,7 @@ class Session:
             words += [word for word in ("go_to", *PLACES) if word not in words]
         can_inject = injections(self.host.axis.places)
         words += ["inject"] if can_inject and "inject" not in words else []
+        words.append("selector")
         q = self.host.axis.live.operation
         limits = None if q.endless else [q.lowest, q.highest]
         period = self.host.board.loop.period * 1e-9
@@ -76,7 +80,7 @@ class Session:
     def status(self) -> dict[str, Any]:
         """The axis now."""
         keeper = self.host.keeper
-        kept = {"store": keeper.told() if keeper else None, "find": self.find_position()}
+        kept = {"store": keeper.told() if keeper else None, "find": self.find_position(), "selector": self.selector}
         return self._between_periods() | kept
 
     def _between_periods(self) -> dict[str, Any]:
@@ -97,8 +101,10 @@ class Session:
         """Ask for something; gives the id under which it will end. A `DetentError` where it makes no sense."""
         if word in PLACES:
             return self.host.settle(self._places.do(word, value, client))
+        if word == "selector":
+            return self._select(value)
         if word not in WORDS:
-            raise DetentError(f"no command {word!r}; there are {', '.join((*WORDS, *PLACES))}")
+            raise DetentError(f"no command {word!r}; there are {', '.join((*WORDS, *PLACES, 'selector'))}")
         if word == "job":
             return self._begin_job(value, speed, client, more)
         if word == "go_to" and (place := self._place_of(value)) is not None:
@@ -153,6 +159,24 @@ class Session:
         for kind, value in zip(kinds, taken, strict=True):
             self.host.ask(kind, value, id=number, client=client)
         return len(taken)
+
+    def _select(self, value: object) -> int:
+        """Turn the selector; that others still move the axis is for who knows them."""
+        if value not in SELECTOR:
+            raise DetentError(f"selector: got {value!r:.60}; expected one of {', '.join(SELECTOR)}")
+        self.selector = str(value)
+        return self.host.settle(0)
+
+    def barred(self, word: str, value: object = None, *, remote: bool) -> int:
+        """Why the selector refuses a command of somebody at the axis, or elsewhere; 0 where it does not.
+
+        Who is at the axis turns it, always; from elsewhere it is not turned to local, nor away from there.
+        """
+        if word in ALWAYS or (word == "selector" and not remote):
+            return 0
+        if remote and "local" in (self.selector, value if word == "selector" else ""):
+            return ON_LOCAL
+        return ON_REMOTE if self.selector == "remote" and not remote else 0
 
     def _begin_job(self, value: object, speed: float, client: int, known: Mapping[str, int]) -> int:
         """Read a job and begin it; one at a time, for it has one tray."""

@@ -178,6 +178,8 @@ def why_not_moving(status: dict[str, Any], client: int = 0) -> list[tuple[str, s
     enabled = status["state"] == "operation enabled"
     if client and status["client"] not in (0, client):
         found.append(("somebody else commands", "take over, which stops a motion of theirs, or let them finish"))
+    if status["selector"] == "remote":
+        found.append(("the selector stands on remote: only faces command", "turn the selector to both, or to local"))
     if status["trust"] == "unknown":
         found.append(("the position is not known: it creeps, and goes to no position", status["find"]))
     if status["store"] and status["store"]["trouble"]:

@@ -67,6 +67,57 @@ def test_what_is_no_message_is_an_error(channel: Channel, client: Client, line: 
     assert list(channel._answer(line, client)) == ["error"]
 
 
+@pytest.mark.parametrize(
+    ("stands", "remote", "word", "value", "why"),
+    [
+        ("both", True, "enable", None, 0), ("both", False, "enable", None, 0),
+        ("local", True, "enable", None, 115), ("local", False, "enable", None, 0),
+        ("remote", True, "enable", None, 0), ("remote", False, "enable", None, 116),
+        ("local", True, "stop", None, 0), ("local", True, "disable", None, 0), ("local", True, "leave", None, 0),
+        ("remote", False, "stop", None, 0), ("remote", False, "selector", "both", 0),
+        ("remote", True, "selector", "both", 0), ("both", True, "selector", "remote", 0),
+        ("both", True, "selector", "local", 115), ("local", True, "selector", "both", 115),
+    ],
+)  # fmt: skip
+def test_the_selector_refuses_who_may_not_command(
+    channel: Channel, stands: str, remote: bool, word: str, value: str | None, why: int
+) -> None:
+    session, somebody = channel.session, Client(8, SimpleNamespace(), "somebody", remote)  # type: ignore[arg-type]
+    session.wait(session.ask("leave", client=int(session.host.board.operation.client) or 1))
+    session.selector = stands
+    answer = channel._answer(json.dumps({"do": word} | ({"value": value} if value else {})).encode(), somebody)
+    ended = session.wait(answer["id"])
+    assert ended.code == why
+    assert (session.selector != stands) == (word == "selector" and not why)
+    session.selector = "both"
+
+
+def test_a_selector_that_is_turned_stops_who_may_not_command_any_more(channel: Channel) -> None:
+    session, face = channel.session, Client(9, SimpleNamespace(), "a face", remote=True)  # type: ignore[arg-type]
+    channel._clients[9] = face
+    o = session.host.board.operation
+    session.wait(session.ask("leave", client=int(o.client) or 1))
+    for word in ("enable", "confirm"):
+        session.wait(session.ask(word, client=9))
+    moving = session.ask("move_by", "20 mm", client=9)
+    session.host.run(5)
+    assert (o.client, o.running) == (9, moving)
+    channel._answer(b'{"do": "selector", "value": "local"}', Client(8, SimpleNamespace(), "me"))  # type: ignore[arg-type]
+    assert session.wait(moving).how == "aborted"
+    assert o.client == 0
+    assert channel.audit.recent()["records"][-2]["note"] == "the selector stands on local"
+    session.selector = "both"
+    del channel._clients[9]
+
+
+@pytest.mark.parametrize("value", [None, "", "LOCAL", 1, ["local"]])
+def test_a_selector_has_three_places(channel: Channel, client: Client, value: object) -> None:
+    assert (
+        "expected one of both, local, remote"
+        in channel._answer(json.dumps({"do": "selector", "value": value}).encode(), client)["error"]
+    )
+
+
 def test_what_is_no_number_is_told_as_null() -> None:
     sent: list[bytes] = []
     transport = SimpleNamespace(get_write_buffer_size=lambda: 0)

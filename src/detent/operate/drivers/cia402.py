@@ -126,8 +126,10 @@ RECORDS: dict[tuple[int, str], tuple[Entry, ...]] = {
 
 
 def _variable(entry: Entry, index: int, part: int = 0) -> ODVariable:
-    made = ODVariable(entry.name, index, part)
+    made: Any = ODVariable(entry.name, index, part)
     made.data_type, made.access_type, made.default = entry.kind, entry.access, entry.default
+    if entry.default < 0:  # canopen would write 0x-1 into the data sheet, which no reader takes, its own neither
+        made.default_raw = str(entry.default)
     return made
 
 

@@ -62,6 +62,7 @@ function wireStop() {
   });
   form.querySelector("button").addEventListener("pointerdown", stop); // at the press, not at the release
   $("off").addEventListener("click", () => act("disable"));
+  $("selector").addEventListener("change", (event) => act("selector", event.target.value));
 }
 
 /** The reasons why it does not move, each with its remedy, as a button where that is a command. */
@@ -97,6 +98,8 @@ function showStatus() {
   say($("doing"), status.running ? status.running.command : status.rests ? "at rest" : "moving");
   const free = link.about.limits && status.trust === "unknown"; // nobody knows where they are
   say($("limits"), free ? "limits NOT active: position unknown" : status.limited && level === "good" ? "at the limit of effort" : status.confirmed ? "" : "a tenth of the speed until confirmed");
+  if (document.activeElement !== $("selector")) $("selector").value = status.selector;
+  mark($("selector"), "warn", status.selector !== "both");
   showReasons(why, status.running);
   view?.status?.(status, link.now);
   $("updates").value = String(++showStatus.count);
