@@ -31,7 +31,7 @@ class Stepped:
         self.host, name = make_host(self.file, overrides, wall=False)
         self.session = Session(self.host, {"name": name, "file": str(self.file), "simulated": True, "speed": 1.0})
         self.channel = Channel(self.session, folder / "axis.sock")
-        self.started = {"channel": str(self.channel.path)}
+        self.channels = {"": self.channel.path}
         self.state: Any = self.host.axis.state
         self.operation = self.host.board.operation
 
