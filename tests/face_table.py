@@ -5,6 +5,7 @@ seen in docs/face_figures.json, and writes docs/explanation/faces-table.md from 
 """
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -15,7 +16,6 @@ import pytest
 
 from tests import foreign
 from tests.face_table_page import CLIENTS, KEPT, PAGE, TESTS, names_of, page
-from tests.live_figures import surroundings
 
 
 class Seen:
@@ -44,12 +44,13 @@ def version_of(name: str) -> str:
 
 def main() -> int:
     """Run the tests, write the page; the status is theirs."""
-    seen, before = Seen(), surroundings()
+    seen, load = Seen(), round(os.getloadavg()[0], 1)
     status = int(pytest.main([str(TESTS), "-q", "-p", "no:benchmark", "-m", "not long"], plugins=[seen]))
+    from tests.live_figures import surroundings  # which loads what pytest wants to load first
+
     clients = {name for _, names in CLIENTS.values() for name in names}
-    found = {
-        "where": before, "tests": seen.tests, "versions": {name: version_of(name) for name in sorted(clients)},
-    }  # fmt: skip
+    versions = {name: version_of(name) for name in sorted(clients)}
+    found = {"where": surroundings() | {"load": load}, "tests": seen.tests, "versions": versions}
     KEPT.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     PAGE.write_text(page(found), encoding="utf-8")
     return status

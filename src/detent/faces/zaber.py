@@ -73,7 +73,7 @@ class Zaber(Talk):
             flag, data = "RJ", str(error)
         except NotDoneError as error:
             flag, data = "RJ", REJECTIONS.get(error.code, "BADDATA")
-        except (DetentError, ValueError):
+        except (DetentError, ValueError, OverflowError):  # of a number of hundreds of digits
             flag, data = "RJ", "BADDATA"
         status = "BUSY" if self.axis.moving else "IDLE"
         marked = f" {mark}" if mark else ""
