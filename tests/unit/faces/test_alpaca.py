@@ -76,8 +76,10 @@ def test_a_focuser(request_: Any, told: Any) -> None:
 @pytest.mark.parametrize(
     ("request_", "told"),
     [
-        (("PUT", "moveabsolute", {"Position": "400"}), (0x401, None)), (("PUT", "move", {"Position": "360"}), (0x401, None)),
-        (("PUT", "moveabsolute", {"Position": "90"}), (0, None)), (("PUT", "reverse", {"Reverse": "true"}), (0x400, None)),
+        (("PUT", "moveabsolute", {"Position": "400"}), (0x401, None)),
+        (("PUT", "move", {"Position": "360"}), (0x401, None)),
+        (("PUT", "moveabsolute", {"Position": "90"}), (0, None)),
+        (("PUT", "reverse", {"Reverse": "true"}), (0x400, None)),
     ],
 )  # fmt: skip
 def test_a_rotator(request_: Any, told: Any) -> None:
@@ -110,7 +112,8 @@ def test_another_device_is_none() -> None:
 @given(
     st.sampled_from(["GET", "PUT"]), st.sampled_from(["move", "position", "action", "connected", "tempcomp", "halt"]),
     st.dictionaries(
-        st.sampled_from(["Position", "Connected", "Action", "TempComp", "ClientTransactionID", "ClientID"]), st.text(max_size=8)
+        st.sampled_from(["Position", "Connected", "Action", "TempComp", "ClientTransactionID", "ClientID"]),
+        st.text(max_size=8),
     ),
 )  # fmt: skip
 def test_whatever_is_asked_is_answered_or_is_no_request(method: str, name: str, said: dict[str, object]) -> None:

@@ -6,7 +6,9 @@ from collections.abc import Awaitable, Callable
 import pytest
 from tests.fake_axis import FakeLine, service
 
-canopen = pytest.importorskip("canopen")
+pytest.importorskip("canopen")
+import canopen
+
 from detent.control.axis_states import STATE_NAMES
 from detent.faces.node402 import Node, objects_of, word
 from detent.operate.drivers.cia402 import state_of
@@ -58,18 +60,16 @@ def test_bit_9_is_whether_control_words_are_followed(status: dict[str, object], 
 
 def test_what_is_shown_is_the_axis() -> None:
     async def work(node: Node, line: FakeLine) -> None:
-        line.status |= {
-            "position": 0.0300014,
-            "velocity": -0.0125,
-            "effort": 0.25,
-            "error": 2e-6,
-            "commanded": 0.030003,
-        }
+        sent: list[tuple[int, int]] = []
+        node.node.emcy.send = lambda code, register: sent.append((code, register))
+        line.status |= {"position": 0.0300014, "velocity": -0.0125, "effort": 0.25, "error": 2e-6}
+        line.status["commanded"] = 0.030003
         line.status["fault"] = {"code": 10, "text": "it does not follow"}
         await node.axis.refresh()
         shown = {index: value_of(node, index, signed=True) for index in (0x6064, 0x606C, 0x6077, 0x60F4, 0x6062)}
         assert shown == {0x6064: 30_001, 0x606C: -12_500, 0x6077: 250, 0x60F4: 2, 0x6062: 30_003}
         assert (value_of(node, 0x603F), value_of(node, 0x1001)) == (0x8611, 1)
+        assert sent == [(0x8611, 1)]
         assert [value_of(node, 0x2000, part) for part in (1, 2, 3, 4)] == [100, 30_001, 2, 10]
 
     noded(work)
