@@ -35,6 +35,7 @@ LOADS = {
     "skipped": ("periods skipped", "{:.2%}"), "work": ("computing in a period", "{:.0f} us"),
     "axis": ("processor, of the axis' process", "{:.0f} %"), "faces": ("processor, of all its faces", "{:.0f} %"),
 }  # fmt: skip
+PASSED = "passed", "passed when run again"  # a machine that others use as well may be too slow for a client once
 NUMBERS = range(1, 33)  # of the tests that are asked for
 HEAD = """# Faces: clients, times and load
 
@@ -108,7 +109,10 @@ def client_rows(kept: dict[str, Any]) -> Iterator[str]:
 
 def load_rows(kept: dict[str, Any]) -> Iterator[str]:
     """The loop alone, and with four faces and a panel that are asked fifty times a second."""
-    loop = next(one["loop"] for one in kept["tests"].values() if "loop" in one)
+    loop = next((one["loop"] for one in kept["tests"].values() if "loop" in one), None)
+    if loop is None:
+        yield "| not measured | | |"
+        return
     for key, (what, form) in LOADS.items():
         yield f"| {what} | {form.format(loop['alone'][key])} | {form.format(loop['polled'][key])} |"
 
@@ -117,8 +121,8 @@ def test_rows(kept: dict[str, Any]) -> Iterator[str]:
     """Of each number what was run, and what came of it."""
     for number in NUMBERS:
         of_it = {name: one["outcome"] for name, one in kept["tests"].items() if number in numbers_of(name)}
-        passed = sum(outcome == "passed" for outcome in of_it.values())
-        others = [f"`{name}` {outcome}" for name, outcome in of_it.items() if outcome != "passed"]
+        passed = sum(outcome in PASSED for outcome in of_it.values())
+        others = [f"`{name}` {outcome}" for name, outcome in of_it.items() if outcome != PASSED[0]]
         told = "; ".join([f"{passed} of {len(of_it)}" if of_it else "**not run**", *others])
         names = sorted({name.partition("[")[0].partition(f"_{number:02d}_")[2].replace("_", " ") for name in of_it})
         yield f"| {number} | {'; '.join(names)} | {told} |"
