@@ -12,6 +12,7 @@ from tests.live_bench import Bench
 from tests.live_processes import live_folder
 from typer.testing import CliRunner, Result
 
+import detent
 from detent.cli import app
 from detent.cli import live as commands
 from detent.operate.audit import Audit
@@ -81,6 +82,21 @@ def test_an_axis_is_asked_from_a_terminal(file: Path, served: Served) -> None:
     assert (beyond.exit_code, beyond.stdout, "31" in beyond.stderr) == (1, "", True)
     assert call("connect", file, "move_to", "7 V").exit_code == 2
     assert 'such as "20 mm/s"' in call("connect", file, "jog").stderr
+
+
+def test_the_selector_is_turned_from_a_terminal(file: Path, served: Served) -> None:
+    assert call("connect", file, "selector", "remote").exit_code == 0
+    refused = call("connect", file, "enable")
+    assert (refused.exit_code, "(114)" in refused.stderr) == (1, True)
+    assert "detent connect FILE selector both" in refused.stderr
+    assert "only faces command" in call("connect", file).stdout
+    assert call("connect", file, "stop").exit_code == 0
+    wrong = call("connect", file, "selector", "me")
+    assert (wrong.exit_code, "both, local, remote" in wrong.stderr) == (2, True)
+    with detent.connect(channel_of(file)) as axis:
+        assert axis.select("both").done
+        axis.enable()
+    assert served.channel.session.selector == "both"
 
 
 def test_faults_and_the_link_to_the_panel_are_told(file: Path, served: Served) -> None:
