@@ -41,7 +41,7 @@ HEAD = """# Faces: clients, times and load
 
 This page is written by `python -m tests.face_table`, run from the root of the project; do not edit it. That runs every
 acceptance test of the faces but those that take minutes, with unmodified clients. The figures are those of
-{processors} of {processor}, Linux {system}, on {day}; {load:g} processes wanted a processor in the minute before. Run
+{processors} processors of {processor}, Linux {system}, on {day}; {load:g} processes wanted a processor in the minute before. Run
 it again after a change of the tests or of a client: a test sees to it that the page belongs to both.
 
 ## Clients
@@ -87,6 +87,15 @@ def tests_of(kept: dict[str, Any]) -> set[str]:
     return {name.partition("[")[0] for name in kept["tests"]}
 
 
+def about(name: str) -> str:
+    """What a test looks at.
+
+    >>> about("test_02_03_ophyd_async_motor[epics-ca]")
+    'ophyd async motor'
+    """
+    return re.sub(r"^test_(\d\d_)+", "", name.partition("[")[0]).replace("_", " ")
+
+
 def numbers_of(name: str) -> list[int]:
     """Numbers of the specification that a test is of.
 
@@ -124,7 +133,7 @@ def test_rows(kept: dict[str, Any]) -> Iterator[str]:
         passed = sum(outcome in PASSED for outcome in of_it.values())
         others = [f"`{name}` {outcome}" for name, outcome in of_it.items() if outcome != PASSED[0]]
         told = "; ".join([f"{passed} of {len(of_it)}" if of_it else "**not run**", *others])
-        names = sorted({name.partition("[")[0].partition(f"_{number:02d}_")[2].replace("_", " ") for name in of_it})
+        names = sorted({about(name) for name in of_it})
         yield f"| {number} | {'; '.join(names)} | {told} |"
 
 
