@@ -37,13 +37,8 @@ def version_of(name: str) -> str:
     pinned = names_of(foreign)
     if name in pinned:
         return pinned[name]
-    packaged = [
-        str(shutil.which("dpkg-query")),
-        "-W",
-        "-f",
-        "${Version}",
-        name,
-    ]  # mbpoll's own -V is that of no release
+    # What mbpoll itself says to -V is that of no release.
+    packaged = [str(shutil.which("dpkg-query")), "-W", "-f", "${Version}", name]
     command = packaged if shutil.which("dpkg-query") else [str(shutil.which(name)), "-V"]
     asked = subprocess.run(command, capture_output=True, text=True, check=False)
     (found,) = re.findall(r"\d+\.\d+[\w.+-]*", asked.stdout + asked.stderr)[:1] or ["?"]

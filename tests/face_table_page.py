@@ -33,7 +33,7 @@ CLIENTS: dict[str, tuple[str, tuple[str, ...]]] = {
 """Protocol and clients by test."""
 LOADS = {
     "skipped": ("periods skipped", "{:.2%}"), "work": ("computing in a period", "{:.0f} us"),
-    "axis": ("processor, of the axis' process", "{:.0f} %"), "faces": ("processor, of all its faces", "{:.0f} %"),
+    "axis": ("processor, of the axis' process", "{:.0f}%"), "faces": ("processor, of all its faces", "{:.0f}%"),
 }  # fmt: skip
 PASSED = "passed", "passed when run again"  # a machine that others use as well may be too slow for a client once
 NUMBERS = range(1, 33)  # of the tests that are asked for
@@ -41,8 +41,8 @@ HEAD = """# Faces: clients, times and load
 
 This page is written by `python -m tests.face_table`, run from the root of the project; do not edit it. That runs every
 acceptance test of the faces but those that take minutes, with unmodified clients. The figures are those of
-{processors} processors of {processor}, Linux {system}, on {day}; {load:g} processes wanted a processor in the minute before. Run
-it again after a change of the tests or of a client: a test sees to it that the page belongs to both.
+{processors} processors of {processor}, Linux {system}, on {day}; {load:g} processes wanted a processor in the minute
+before. Run it again after a change of the tests or of a client: a test sees to it that the page belongs to both.
 
 ## Clients
 
@@ -123,7 +123,8 @@ def load_rows(kept: dict[str, Any]) -> Iterator[str]:
         yield "| not measured | | |"
         return
     for key, (what, form) in LOADS.items():
-        yield f"| {what} | {form.format(loop['alone'][key])} | {form.format(loop['polled'][key])} |"
+        shown = " | ".join(form.format(loop[when][key]).replace("%", " %") for when in ("alone", "polled"))
+        yield f"| {what} | {shown} |"
 
 
 def test_rows(kept: dict[str, Any]) -> Iterator[str]:
