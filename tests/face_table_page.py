@@ -76,13 +76,13 @@ def names_of(pins: Any) -> dict[str, str]:
     return {**dict(pinned), name: version}
 
 
-def tests_now() -> set[str]:
+def present_tests() -> set[str]:
     """Names of the acceptance tests that there are."""
     tree = ast.parse(TESTS.read_text(encoding="utf-8"))
     return {one.name for one in tree.body if isinstance(one, ast.FunctionDef) and one.name.startswith("test_")}
 
 
-def tests_of(kept: dict[str, Any]) -> set[str]:
+def kept_tests(kept: dict[str, Any]) -> set[str]:
     """Names of those that were run."""
     return {name.partition("[")[0] for name in kept["tests"]}
 
@@ -127,7 +127,7 @@ def load_rows(kept: dict[str, Any]) -> Iterator[str]:
         yield f"| {what} | {shown} |"
 
 
-def test_rows(kept: dict[str, Any]) -> Iterator[str]:
+def rows_by_number(kept: dict[str, Any]) -> Iterator[str]:
     """Of each number what was run, and what came of it."""
     for number in NUMBERS:
         of_it = {name: one["outcome"] for name, one in kept["tests"].items() if number in numbers_of(name)}
@@ -140,5 +140,5 @@ def test_rows(kept: dict[str, Any]) -> Iterator[str]:
 
 def page(kept: dict[str, Any]) -> str:
     """The page."""
-    parts = (HEAD.format(**kept["where"]), client_rows(kept)), (COST, load_rows(kept)), (NUMBERED, test_rows(kept))
+    parts = (HEAD.format(**kept["where"]), client_rows(kept)), (COST, load_rows(kept)), (NUMBERED, rows_by_number(kept))
     return "".join(head + "\n".join(rows) + "\n" for head, rows in parts)

@@ -15,7 +15,7 @@ def test_the_page_is_made_of_what_is_kept():
 
 
 def test_it_belongs_to_the_present_tests_and_clients():
-    assert of.tests_of(FOUND) == of.tests_now(), AGAIN
+    assert of.kept_tests(FOUND) == of.present_tests(), AGAIN
     assert set(of.CLIENTS) <= set(FOUND["tests"]), AGAIN
     pinned = of.names_of(foreign)
     assert all(pinned.get(name, version) == version for name, version in FOUND["versions"].items()), AGAIN
@@ -30,6 +30,6 @@ def test_what_failed_or_was_not_run_is_said():
     test = "test_20_pymodbus"
     found["tests"][test]["outcome"] = "failed"
     assert any("pymodbus" in row and "| failed |" in row for row in of.client_rows(found))
-    assert any(f"`{test}` failed" in row for row in of.test_rows(found))
+    assert any(f"`{test}` failed" in row for row in of.rows_by_number(found))
     del found["tests"][test]
     assert any("pymodbus" in row and "| not run |" in row for row in of.client_rows(found))
