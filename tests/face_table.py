@@ -5,6 +5,7 @@ seen in docs/face_figures.json, and writes docs/explanation/faces-table.md from 
 """
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -14,8 +15,7 @@ from typing import Any
 import pytest
 
 from tests import foreign
-from tests.face_table_page import CLIENTS, KEPT, PAGE, TESTS, names_of, page
-from tests.live_figures import surroundings
+from tests.face_table_page import CLIENTS, KEPT, PAGE, PASSED, TESTS, names_of, page
 
 
 class Seen:
@@ -37,19 +37,29 @@ def version_of(name: str) -> str:
     pinned = names_of(foreign)
     if name in pinned:
         return pinned[name]
-    asked = subprocess.run([str(shutil.which(name)), "-V"], capture_output=True, text=True, check=False)
+    # What mbpoll itself says to -V is that of no release.
+    packaged = [str(shutil.which("dpkg-query")), "-W", "-f", "${Version}", name]
+    command = packaged if shutil.which("dpkg-query") else [str(shutil.which(name)), "-V"]
+    asked = subprocess.run(command, capture_output=True, text=True, check=False)
     (found,) = re.findall(r"\d+\.\d+[\w.+-]*", asked.stdout + asked.stderr)[:1] or ["?"]
     return found
 
 
 def main() -> int:
     """Run the tests, write the page; the status is theirs."""
-    seen, before = Seen(), surroundings()
-    status = int(pytest.main([str(TESTS), "-q", "-p", "no:benchmark", "-m", "not long"], plugins=[seen]))
+    seen, load = Seen(), round(os.getloadavg()[0], 1)
+    words = ["-q", "-p", "no:benchmark", "-m", "not long"]
+    status = int(pytest.main([str(TESTS), *words], plugins=[seen]))
+    failed = [name for name, one in seen.tests.items() if one["outcome"] != "passed"]
+    if failed:
+        status = int(pytest.main([*(f"{TESTS}::{name}" for name in failed), *words], plugins=[seen]))
+        for one in (seen.tests[name] for name in failed):
+            one["outcome"] = PASSED[1] if one["outcome"] == PASSED[0] else one["outcome"]
+    from tests.live_figures import surroundings  # which loads what pytest wants to load first
+
     clients = {name for _, names in CLIENTS.values() for name in names}
-    found = {
-        "where": before, "tests": seen.tests, "versions": {name: version_of(name) for name in sorted(clients)},
-    }  # fmt: skip
+    versions = {name: version_of(name) for name in sorted(clients)}
+    found = {"where": surroundings() | {"load": load}, "tests": seen.tests, "versions": versions}
     KEPT.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     PAGE.write_text(page(found), encoding="utf-8")
     return status

@@ -84,7 +84,7 @@ def told(name: str, script: str, *words: str, timeout: float = 60.0, **environ: 
         process.kill()
         out, err = process.communicate()
         pytest.fail(f"{script} {' '.join(words)} has not ended within {timeout:g} s\n{out[-2000:]}\n{err[-3000:]}")
-    assert process.returncode == 0, f"{script} {' '.join(words)}\n{out[-2000:]}\n{err[-3000:]}"
+    assert process.returncode == 0, f"{script} {' '.join(words)}: {process.returncode}\n{out[-2000:]}\n{err[-3000:]}"
     return out
 
 

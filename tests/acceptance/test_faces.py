@@ -1070,7 +1070,8 @@ def by_page(axis: Faced, left: threading.Event, found: Shown) -> None:
 
 def load_of(live: Faced, own: Any, seconds: float) -> dict[str, float]:
     """Share of periods skipped meanwhile, time of computing in one [us], and shares of a processor [%]."""
-    ids = [live.process.pid, *live.started["face_processes"].values()]
+    faces = [one for one in family(live.process.pid) if "detent.faces" in Path(f"/proc/{one}/cmdline").read_text()]
+    ids = [live.process.pid, *faces]
     before, used, begin = own.status["loop"], [spent(one) for one in ids], time.monotonic()
     time.sleep(seconds)
     after, took = own.status["loop"], time.monotonic() - begin

@@ -70,7 +70,7 @@ from detent.control.head_computer import IDLE
 from detent.control.operation import ABORTED, DONE, REFUSED
 from detent.control.reaction import REACTION_NAMES, RULES, rule_of
 from detent.control.step_rule import INFEASIBLE
-from detent.errors import DRIVE_LOST, LOOP_OVERRUN, OTHER_HARDWARE, DetentError
+from detent.errors import DRIVE_LOST, LOOP_OVERRUN, ON_REMOTE, OTHER_HARDWARE, DetentError
 from detent.faces.cia402 import drive_of
 from detent.kernel.loop import advance, replay
 from detent.kernel.registers import CONTROLLER, PLANT, Registers
@@ -1960,7 +1960,7 @@ def test_44_an_hour_of_telemetry_leaves_the_heap_as_it_is(tmp_path: Path) -> Non
 def test_45_two_browsers_see_who_commands_and_either_stops(tmp_path: Path) -> None:
     """The second is refused, a viewer stops, and taking over ends the jog of the first."""
     with panelled(tmp_path, "cascade.toml", "--period", "10 ms") as live:
-        found = run_script("two", live.link(), live.link(), live.link("viewer"))
+        found = run_script("two", live.link(), live.link(), live.link("viewer"), str(tmp_path / "remote.png"))
     assert found["problems"] == []
     assert found["mine"].startswith("you command")
     assert "engineer" in found["theirs"]
@@ -1971,6 +1971,12 @@ def test_45_two_browsers_see_who_commands_and_either_stops(tmp_path: Path) -> No
     assert found["afterTaking"]["theirs"].startswith("you command")
     assert not found["afterTaking"]["mine"].startswith("you")
     assert found["afterTaking"]["pressed"] == 0
+    assert not found["viewerTurns"]
+    assert [found["turned"][place]["code"] for place in ("local", "remote", "both")] == [0, ON_REMOTE, 0]
+    assert "faces may not command" in found["turned"]["local"]["who"]
+    assert "only faces may command" in found["turned"]["remote"]["who"]
+    assert "turn the selector" in found["turned"]["remote"]["why"]
+    assert "faces" not in found["turned"]["both"]["who"]
 
 
 @pytest.mark.wide

@@ -1,5 +1,5 @@
 // Two browsers at one axis: who commands is seen by both, either stops, and taking over stops a jog first.
-// Usage: two.mjs LINK-OF-AN-OPERATOR LINK-OF-AN-OPERATOR LINK-OF-A-VIEWER
+// Usage: two.mjs LINK-OF-AN-OPERATOR LINK-OF-AN-OPERATOR LINK-OF-A-VIEWER PICTURE
 
 import { browser, enter, status, until, view } from "./panel.mjs";
 
@@ -38,5 +38,16 @@ await drawn(other, true);
 await drawn(one, false);
 found.afterTaking = { mine: await who(one), theirs: await who(other), pressed: await one.locator(".jog[aria-pressed=true]").count() };
 await one.mouse.up();
+for (const page of [other, viewer]) await view(page, "status");
+found.viewerTurns = await viewer.locator("#selector").isEnabled();
+found.turned = {};
+for (const place of ["local", "remote", "both"]) {
+  await other.selectOption("#selector", place);
+  await until(one, (s) => s.selector === place);
+  await viewer.waitForFunction((to) => document.getElementById("selector").value === to, place);
+  const moves = await other.evaluate(() => window.panel.link.command("move_by", 0.0).then(({ ended }) => ended));
+  if (place === "remote") await other.screenshot({ path: process.argv[5] });
+  found.turned[place] = { code: moves.code, who: await who(viewer), why: await other.locator("#why").textContent() };
+}
 console.log(JSON.stringify({ ...found, problems: [one, other, viewer].flatMap((page) => page.problems) }));
 await chromium.close();

@@ -324,6 +324,6 @@ class Motor:
 def name_of(face: str, address: str, port: int) -> tuple[str, str, int]:
     """Record, host and port of ``lab:m1`` or ``lab:m1@127.0.0.1:5064``."""
     name, _, place = address.partition("@")
-    if not name or len(name) > 50 or any(not (c.isalnum() or c in "_-:+[]<>;") for c in name):
+    if not name or len(name) > 50 or any(not ((c.isascii() and c.isalnum()) or c in "_-:+[]<>;") for c in name):
         raise DetentError(f'{face}: got a record called {name!r:.60}; expected letters, digits and any of "_-:+[]<>;"')
     return (name, *address_of(face, place, port))

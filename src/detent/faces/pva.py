@@ -52,18 +52,24 @@ class Signal:
 
     def __init__(self, signals: Signals, channel: str) -> None:
         self._signals, self._channel, self._shown = signals, channel, (0.0, "")
+        self._is_looked_at = False
         self.pv = SharedPV(handler=self, nt=NTScalar("d", display=True))
 
     async def onFirstConnect(self, pv: Any) -> None:  # noqa: N802 - as p4p calls it
-        """Somebody has come."""
+        """Somebody has come, and may have gone before there is a value."""
+        self._is_looked_at = True
         self._signals.look(self._channel, self)
-        self._shown = await self._signals.once(self._channel)
-        pv.open(self._whole())
+        shown = await self._signals.once(self._channel)
+        if self._is_looked_at and not pv.isOpen():
+            self._shown = shown
+            pv.open(self._whole())
 
     async def onLastDisconnect(self, pv: Any) -> None:  # noqa: N802 - as p4p calls it
         """Nobody is left."""
+        self._is_looked_at = False
         self._signals.leave(self._channel, self)
-        pv.close()
+        if pv.isOpen():
+            pv.close()
 
     async def show(self, value: float, wrong: str) -> None:
         """Tell clients, where it is new."""

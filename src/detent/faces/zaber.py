@@ -74,7 +74,7 @@ class Zaber(Talk):
             flag, data = "RJ", str(error)
         except NotDoneError as error:
             flag, data = "RJ", REJECTIONS.get(error.code, "BADDATA")
-        except (DetentError, ValueError):
+        except (DetentError, ValueError, OverflowError):  # of a number of hundreds of digits
             flag, data = "RJ", "BADDATA"
         asked = self._asked(number)
         status = "BUSY" if any(axis.moving for axis in asked) else "IDLE"

@@ -17,13 +17,13 @@ import threading
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from inspect import signature
 from pathlib import Path
 from typing import Any, cast
 
-from detent.control.operation import STALE
+from detent.control.operation import SECOND, STALE
 from detent.errors import AxisError, DetentError
 from detent.files.text import shown
 from detent.operate.audit import Audit
@@ -348,6 +348,13 @@ class Channel:
             "lost": self.lost,
         }  # fmt: skip
 
+    def _named(self, ended: Ended) -> Ended:
+        """A refusal with the name of who commands."""
+        holder = self._clients.get(int(self.session.host.board.operation.client))
+        if ended.code != SECOND or holder is None:
+            return ended
+        return replace(ended, reason=f"{ended.reason} ({holder.who})")
+
     async def _tell_endings(self, client: Client) -> None:
         while True:
             for command in sorted(client.open):
@@ -357,7 +364,7 @@ class Channel:
                     if command in client.told:
                         client.told.discard(command)
                         self.audit.note(client.who, client=client.number, ended=command, how=ended.how, code=ended.code)
-                    _send(client.writer, {"ended": ended.to_dict()})
+                    _send(client.writer, {"ended": self._named(ended).to_dict()})
             await asyncio.sleep(LOOK)
 
 

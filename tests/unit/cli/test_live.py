@@ -87,6 +87,21 @@ def test_an_axis_is_asked_from_a_terminal(file: Path, served: Served) -> None:
     assert 'such as "20 mm/s"' in call("connect", file, "jog").stderr
 
 
+def test_the_selector_is_turned_from_a_terminal(file: Path, served: Served) -> None:
+    assert call("connect", file, "selector", "remote").exit_code == 0
+    refused = call("connect", file, "enable")
+    assert (refused.exit_code, "(114)" in refused.stderr) == (1, True)
+    assert "detent connect FILE selector both" in refused.stderr
+    assert "only faces command" in call("connect", file).stdout
+    assert call("connect", file, "stop").exit_code == 0
+    wrong = call("connect", file, "selector", "me")
+    assert (wrong.exit_code, "both, local, remote" in wrong.stderr) == (2, True)
+    with detent.connect(channel_of(file)) as axis:
+        assert axis.select("both").done
+        axis.enable()
+    assert served.channel.session.selector == "both"
+
+
 def test_faults_and_the_link_to_the_panel_are_told(file: Path, served: Served) -> None:
     for word in ("enable", "confirm"):
         call("connect", file, word)

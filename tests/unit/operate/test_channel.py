@@ -110,6 +110,20 @@ def test_a_selector_that_is_turned_stops_who_may_not_command_any_more(channel: C
     del channel._clients[9]
 
 
+def test_a_refusal_says_who_commands(channel: Channel) -> None:
+    channel._clients[9] = Client(9, SimpleNamespace(), "modbus face", remote=True)  # type: ignore[arg-type]
+    o = channel.session.host.board.operation
+    channel.session.wait(channel.session.ask("leave", client=int(o.client) or 1))
+    channel.session.wait(channel.session.ask("take", client=9))
+    refused = channel.session.wait(channel.session.ask("enable", client=8))
+    assert (refused.code, refused.reason) == (ops.SECOND, "somebody else commands")
+    assert channel._named(refused).reason == "somebody else commands (modbus face)"
+    assert channel._named(refused).remedy == refused.remedy
+    channel.session.wait(channel.session.ask("leave", client=9))
+    assert channel._named(refused) == refused
+    del channel._clients[9]
+
+
 @pytest.mark.parametrize("value", [None, "", "LOCAL", 1, ["local"]])
 def test_a_selector_has_three_places(channel: Channel, client: Client, value: object) -> None:
     assert (

@@ -62,7 +62,6 @@ function wireStop() {
   });
   form.querySelector("button").addEventListener("pointerdown", stop); // at the press, not at the release
   $("off").addEventListener("click", () => act("disable"));
-  $("selector").addEventListener("change", (event) => act("selector", event.target.value));
 }
 
 /** The reasons why it does not move, each with its remedy, as a button where that is a command. */
@@ -93,13 +92,12 @@ function showStatus() {
   say($("trust"), status.trust);
   $("trust").className = `trust ${status.trust === "referenced" ? "good" : "warn"}`;
   const who = holder ? (holder === you ? "you command" : `${link.now.holder_name || "somebody else"} commands`) : "nobody commands";
-  say($("who"), `${link.now.lost ? `${link.now.lost}; ` : ""}${who}, ${clients} ${clients === 1 ? "page or program" : "pages and programs"}`);
-  mark($("who"), "warn", (holder && holder !== you) || link.now.lost);
+  const barred = { local: "faces may not command, ", remote: "only faces may command, " }[status.selector] ?? "";
+  say($("who"), `${link.now.lost ? `${link.now.lost}; ` : ""}${who}, ${barred}${clients} ${clients === 1 ? "page or program" : "pages and programs"}`);
+  mark($("who"), "warn", (holder && holder !== you) || link.now.lost || barred);
   say($("doing"), status.running ? status.running.command : status.rests ? "at rest" : "moving");
   const free = link.about.limits && status.trust === "unknown"; // nobody knows where they are
   say($("limits"), free ? "limits NOT active: position unknown" : status.limited && level === "good" ? "at the limit of effort" : status.confirmed ? "" : "a tenth of the speed until confirmed");
-  if (document.activeElement !== $("selector")) $("selector").value = status.selector;
-  mark($("selector"), "warn", status.selector !== "both");
   showReasons(why, status.running);
   view?.status?.(status, link.now);
   $("updates").value = String(++showStatus.count);

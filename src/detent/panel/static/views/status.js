@@ -1,12 +1,14 @@
 // Status: where it is, where it should be, what limits it.
 
-import { h, mark, pair, say } from "../dom.js";
+import { choice, field, h, mark, pair, say } from "../dom.js";
 import { number, shown } from "../units.js";
 
 const LAMPS = [["ready", "ready"], ["in_window", "in the window"], ["rests", "commanded rest"], ["limited", "effort at its limit"],
   ["confirmed", "first motion confirmed"]];
 
-export function open(root, { link }) {
+const SELECTOR = [["both", "panel and faces, one at a time"], ["local", "panel and programs only"], ["remote", "faces only"]];
+
+export function open(root, { link, act }) {
   const { unit, limits } = link.about;
   const per = `${unit}/s`;
   const rows = {
@@ -19,12 +21,17 @@ export function open(root, { link }) {
   const effort = h("meter", { min: 0, max: 1, high: 0.9, low: 0.7, optimum: 0, id: "effort" });
   const share = h("output", { for: "effort" });
   const lamps = LAMPS.map(([key, text]) => ({ key, lamp: h("li", {}, text) }));
+  const selector = choice(SELECTOR, "both", {
+    id: "selector", disabled: document.querySelector("meta[name=role]").content === "viewer",
+    onchange: async (event) => { await act("selector", event.target.value); event.target.blur(); },
+  });
   root.append(
     h("h1", {}, "Status"),
     h("dl", { class: "cards" }, Object.values(rows).map(({ row }) => row)),
     h("p", { class: "field" }, h("label", { for: "effort" }, "Effort, of its limit"), effort, share),
     h("ul", { class: "lamps" }, lamps.map(({ lamp }) => lamp)),
     h("dl", { class: "cards" }, limits ? [below.row, above.row] : [], stop.row),
+    field("Commands are taken from", selector),
     h("p", { class: "hint" }, `${link.about.name}: file ${link.about.file}, `
       + `${link.about.simulated ? `simulated, time ${link.about.speed} times as fast` : "on hardware"}`),
   );
@@ -35,6 +42,7 @@ export function open(root, { link }) {
         say(below.value, number(s.position - limits[0], unit));
         say(above.value, number(limits[1] - s.position, unit));
       }
+      if (document.activeElement !== selector) selector.value = s.selector;
       say(stop.value, number(s.last_stop, unit));
       effort.value = Math.min(Math.abs(s.effort), 1);
       say(share, `${Math.round(Math.abs(s.effort) * 100)} %${s.limited ? ", limited by the drive" : ""}`);
