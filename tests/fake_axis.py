@@ -1,7 +1,7 @@
 """A line to an axis that is none: it goes where it is told at once, and answers as a live one does."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from detent.errors import REFUSAL_TEXT
@@ -67,23 +67,25 @@ class FakeLine:
         self.gone.set()
 
 
-def service(*, commands: bool = True, **about: Any) -> tuple[AxisService, FakeLine]:
+def service(motor: str = "", *, commands: bool = True, **about: Any) -> tuple[AxisService, FakeLine]:
     """A client of such an axis, inside a running loop."""
     line = FakeLine(**about)
-    axis = AxisService(line, line.about, commands=commands)  # type: ignore[arg-type]
+    axis = AxisService(line, line.about, motor, commands=commands)  # type: ignore[arg-type]
     axis._take({"status": line.status, "you": 1})
     return axis, line
 
 
 class Heard:
-    """A conversation in a dialect, by the bytes that come."""
+    """A conversation in a dialect, by the bytes that come; `axis` and `line` are those of the first motor."""
 
-    def __init__(self, dialect: Callable[..., Any], **more: Any) -> None:
+    def __init__(self, dialect: Callable[..., Any], motors: Sequence[str] = ("",), **more: Any) -> None:
         from detent.faces.talk import Reader
 
-        self.axis, self.line = service(**more)
+        pairs = [service(motor, **more) for motor in motors]
+        self.axis, self.line = pairs[0]
+        self.lines = [line for _, line in pairs]
         self.said = bytearray()
-        self.talk = dialect((self.axis,), self.said.extend)
+        self.talk = dialect(tuple(axis for axis, _ in pairs), self.said.extend)
         self._answer, self._busy = self.talk.answer, 0
         self.talk.answer = self._answering
         self.reader = Reader(self.talk)

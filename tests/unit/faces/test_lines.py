@@ -254,3 +254,44 @@ def test_who_may_not_command_is_refused_and_may_stop(dialect: Any, line: bytes, 
         assert heard.line.asked[-1] == "stop"
 
     talked(dialect, work, commands=why != 120)
+
+
+@pytest.mark.parametrize(
+    ("dialect", "lines", "answer"),
+    [
+        (Scpi, 'INST:CAT?\nINST:SEL "y";INST:SEL?\nENAB;MOVE:ABS 30;*OPC?;POS?', '"x","y"\n"y"\n1;30'),
+        (Gcs, "SAI?\nSVO 1 1 2 1\nMOV 2 30\nPOS? 2\nVEL 2 5\nVEL?", "1 \n2\n2=30.0000000\n1=500.0000000 \n2=5.0000000"),
+        (Zaber, "/1 2 move abs 30000\n/1 get pos\n/get system.axiscount",
+         "@01 2 OK IDLE -- 0\r\n@01 0 OK IDLE -- 20000 30000\r\n@01 0 OK IDLE -- 2"),
+        (Grbl, "G1 Y30 F600\nM0\n$$", "ok\r\nok\r\n"),
+    ],
+)  # fmt: skip
+def test_two_motors_are_two_axes(dialect: Callable[..., Any], lines: str, answer: str) -> None:
+    async def work(heard: Heard) -> None:
+        said = await heard.hear(lines.encode() + b"\n", turns=2000)
+        assert said.startswith(answer) if dialect is Grbl else said.strip() == answer
+        assert [line.status["position"] for line in heard.lines] == [0.02, 0.03]
+
+    talked(dialect, work, motors=("x", "y"))
+
+
+@pytest.mark.parametrize(("dialect", "line"), [(Scpi, "STOP"), (Scpi, "*RST"), (Gcs, "STP"), (Zaber, "/1 stop")])
+def test_a_stop_is_one_of_all_axes(dialect: Callable[..., Any], line: str) -> None:
+    async def work(heard: Heard) -> None:
+        await heard.hear(line.encode() + b"\n")
+        assert [line.asked for line in heard.lines] == [["stop"], ["stop"]]
+
+    talked(dialect, work, motors=("x", "y"))
+
+
+@pytest.mark.parametrize(
+    ("dialect", "line", "told"),
+    [(Gcs, "MOV 3 1\nERR?", "15"), (Gcs, "MOV 1 1 2 1e6\nERR?", "7"), (Zaber, "/1 3 home", "@01 3 RJ IDLE -- BADAXIS"),
+     (Scpi, "INST:SEL z\nSYST:ERR?", '-222,"Data out of range; z: x, y"'), (Grbl, "G0 Z1", "error:20")],
+)  # fmt: skip
+def test_an_axis_that_there_is_not_moves_none(dialect: Callable[..., Any], line: str, told: str) -> None:
+    async def work(heard: Heard) -> None:
+        assert (await heard.hear(line.encode() + b"\n")).strip() == told
+        assert not any({"move_to", "home"} & {*line.asked} for line in heard.lines)
+
+    talked(dialect, work, motors=("x", "y"))
