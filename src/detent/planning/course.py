@@ -23,6 +23,7 @@ FARTHEST = 1e9  # no place is farther from 0 [m]
 LEAST, LARGEST = 1e-9, 1e12  # what a speed, an acceleration, a jerk may be limited to [m/s, m/s^2, m/s^3]
 LONGEST_PERIOD = 1.0  # of a sample [s]
 STRETCHES = 7  # of constant jerk: three of driving, one at speed, three of the stop
+SOON = 4  # samples that an axis without its loops is looked ahead
 HALVINGS = 100  # of the time in which the stop must begin
 ROUNDING = 1e-13  # what two ways to reckon a place may differ by, of the lengths that take part
 
@@ -378,25 +379,25 @@ def advance(p: CourseLimits, c: Course, period: float) -> None:
 
 
 @step
-def follow(p: CourseLimits, c: Course, target: float, velocity: float, acceleration: float, period: float) -> None:
-    """One sample of a course that is led from outside, to `target`, where it has this velocity and acceleration.
+def follow(p: CourseLimits, c: Course, target: float, velocity: float, period: float) -> bool:
+    """One sample of a course that is led: to `target`, where it has this velocity; False if it falls short of it.
 
     It goes no faster than allowed, and nowhere from where a stop would lead past a soft limit: near one it goes as
-    fast as it still can, and rests there.
+    fast as it still can, and rests there. A stop begins without acceleration: whoever leads limits no jerk.
     """
     if not is_usable(p) or not 0.0 < period <= LONGEST_PERIOD:
-        return
+        return False
     begin_to_be_led(p, c)
-    x, way, most = target, target - c.position, p.speed * period
+    x, way, v, most = target, target - c.position, velocity, p.speed * period
     room = ROUNDING * (abs(target) + most)
-    v, a = velocity, min(max(acceleration, -p.acceleration), p.acceleration)
     if abs(way) > most + room or abs(v) * period > most + room:
         way = min(max(way, -most), most)
-        x, v, a = c.position + way, way / period, 0.0
-    if is_past(c.limits, x, v, a):
-        v, a = fastest(c.limits, c.position, way / period, period), 0.0
+        x, v = c.position + way, way / period
+    if is_past(c.limits, c.position, x, v):
+        v = fastest(c.limits, c.position, way / period, period)
         x = c.position + v * period
-    c.position, c.velocity, c.acceleration = x, v, a
+    c.position, c.velocity, c.acceleration = x, v, 0.0
+    return x == target
 
 
 @step
@@ -409,29 +410,35 @@ def begin_to_be_led(p: CourseLimits, c: Course) -> None:
 
 
 @step
-def drift(p: CourseLimits, c: Course, position: float, velocity: float) -> bool:
-    """One sample of a course that is where the axis is; False where that goes too fast, or a stop comes too late."""
+def drift(p: CourseLimits, c: Course, position: float, velocity: float, period: float) -> bool:
+    """One sample of a course that is where the axis is; False where that goes too fast, or a stop would come too late.
+
+    It is reckoned with the velocity that a few samples more would bring, for a stop does not act at once.
+    """
     if not is_usable(p) or not -FARTHEST <= position <= FARTHEST:
         return False
     begin_to_be_led(p, c)
+    gain = velocity - c.velocity
+    soon = velocity + SOON * gain if gain * velocity > 0.0 else velocity
     c.position, c.velocity, c.acceleration = position, min(max(velocity, -p.speed), p.speed), 0.0
-    return abs(velocity) <= p.speed and not is_past(c.limits, position, velocity, 0.0)
+    return abs(velocity) <= p.speed and not is_past(c.limits, position, position + soon * SOON * period, soon)
 
 
 @step
-def is_past(f: CourseLimits, x: float, v: float, a: float) -> bool:
-    """True where a stop from here would lead past the soft limit ahead."""
-    rest = x + way_to_rest(f.acceleration, f.jerk, v, a)
-    return max(x, rest) > f.highest if v > 0.0 else min(x, rest) < f.lowest if v < 0.0 else False
+def is_past(f: CourseLimits, here: float, x: float, v: float) -> bool:
+    """True where the way to a place, or a stop from there, leads farther past a soft limit."""
+    rest = x + way_to_rest(f.acceleration, f.jerk, v, 0.0)
+    low, high = min(x, rest), max(x, rest)
+    return (high > f.highest and high > here) or (low < f.lowest and low < here)
 
 
 @step
-def fastest(f: CourseLimits, x: float, wanted: float, period: float) -> float:
+def fastest(f: CourseLimits, here: float, wanted: float, period: float) -> float:
     """Velocity up to the one that is wanted after a sample of which a stop still ends at the soft limit."""
     low, high = 0.0, wanted
     for _ in range(HALVINGS):
         v = low + (high - low) / 2.0
-        if is_past(f, x + v * period, v, 0.0):
+        if is_past(f, here, here + v * period, v):
             high = v
         else:
             low = v

@@ -742,3 +742,105 @@ def test_it_may_begin_anywhere_at_any_time(m):
     assert (state(c), m.is_at_rest(c)) == ((-3.0, 0.0, 0.0), True)
     m.come_to_rest(p, c)
     assert m.is_at_rest(c)
+
+
+# ---- led from outside
+
+
+def ended(m, jerk=0.0):
+    return limits(m, 1.0, 2.0, jerk, 0.0, 1.0)
+
+
+def test_a_course_that_is_led_goes_where_it_is_told_and_a_stop_begins_there(m):
+    for sign in (1.0, -1.0):
+        c, p = at_rest(m, 0.5), limits(m, 1.0, 2.0, 40.0, 0.0, 1.0)
+        assert m.follow(p, c, 0.5 + sign * 5e-4, sign * 0.5, 1e-3)
+        assert state(c) == (0.5 + sign * 5e-4, sign * 0.5, 0.0)
+        assert (c.mode, m.is_at_rest(c)) == (m.LED, False)
+        m.advance(p, c, 1e-3)  # who leads is not led
+        assert c.position == 0.5 + sign * 5e-4
+        assert near(m.stopping_distance(p, c), sign * (0.5**2 / 4.0 + 0.5 * 2.0 / 80.0))  # v^2/2a + v a/2j
+        m.come_to_rest(p, c)
+        assert near(c.end, 0.5 + sign * (5e-4 + 0.5**2 / 4.0 + 0.5 * 2.0 / 80.0))
+        follow(m, p, c)
+        assert near(c.position, c.end)
+
+
+def test_limits_that_led_it_are_not_those_of_before(m):
+    c, p = at_rest(m, 0.2), limits(m, 1.0, 20.0, 0.0, 0.0, 1.0)
+    assert m.run_at(p, c, 0.5) == m.TAKEN
+    m.advance(p, c, 1e-3)
+    p = ended(m)
+    assert m.follow(p, c, 0.201, 0.1, 1e-3)
+    assert (c.limits.acceleration, c.waiting) == (2.0, 0)
+    p.acceleration = 4.0
+    assert m.follow(p, c, 0.2011, 0.1, 1e-3)
+    assert (c.limits.acceleration, c.asked.acceleration) == (4.0, 4.0)
+    assert m.go_to(p, c, 0.3) == m.TAKEN
+    assert near(follow(m, p, c)[-1][0], 0.3)
+
+
+def test_a_course_that_is_led_too_fast_falls_short_of_it(m):
+    for sign in (1.0, -1.0):
+        for target, velocity in ((0.5 + sign * 0.1, 0.5), (0.5 + sign * 1e-3, sign * 1.01)):
+            c = at_rest(m, 0.5)
+            reached = m.follow(ended(m), c, target, velocity, 1e-3)
+            assert near(c.position, 0.5 + sign * 1e-3)
+            assert near(c.velocity, sign * 1.0)
+            assert reached == (c.position == target)
+        c = at_rest(m, 0.5)
+        assert m.follow(ended(m), c, 0.5 + sign * 1e-3, sign * 1.0, 1e-3)  # at the limit, but for rounding
+        assert (c.position, c.velocity) == (0.5 + sign * 1e-3, sign * 1.0)
+
+
+def test_a_course_that_is_led_beyond_an_end_comes_to_rest_there(m):
+    for sign, jerk in ((1.0, 0.0), (-1.0, 0.0), (1.0, 40.0), (-1.0, 40.0)):
+        c, p, left = at_rest(m, 0.5), ended(m, jerk), []
+        for _ in range(500):
+            m.follow(p, c, 0.5 + sign * 1.5, 0.0, T)
+            assert near(c.acceleration, 0.0)
+            left.append(0.5 - sign * (c.position - 0.5) - sign * m.stopping_distance(p, c))
+        assert min(left) >= -1e-12
+        assert abs(c.position - (0.5 + sign * 0.5)) < 1e-6
+        assert abs(c.velocity) < 1e-3
+        assert m.follow(p, c, 0.5 + sign * 0.499, -sign * 0.25, T)  # and back
+
+
+def test_a_target_beyond_an_end_is_none_though_it_stands_there(m):
+    for sign in (1.0, -1.0):
+        c = at_rest(m, 0.5 + sign * 0.5)
+        assert not m.follow(ended(m), c, 0.5 + sign * 0.5004, 0.0, 1e-3)
+        assert near(c.position, 0.5 + sign * 0.5)
+        c = at_rest(m, 0.5 + sign * 0.6)  # it was pushed there: inwards it may
+        assert m.follow(ended(m), c, 0.5 + sign * 0.5995, -sign * 0.5, 1e-3)
+
+
+def test_nothing_is_led_by_limits_or_in_times_that_are_none(m):
+    for p, period in ((m.CourseLimits(), 1e-3), (ended(m), 0.0), (ended(m), 1.5), (ended(m), nan)):
+        c = at_rest(m, 0.5)
+        assert not m.follow(p, c, 0.5001, 0.1, period)
+        assert (c.position, c.mode) == (0.5, m.REST)
+    assert m.follow(ended(m), c, 0.5001, 1e-4, 1.0)
+    assert not m.drift(m.CourseLimits(), c, 0.5, 0.0, 1e-3)
+
+
+def test_a_course_drifts_with_its_axis_as_far_as_a_stop_allows(m):
+    for sign in (1.0, -1.0):
+        c, p = at_rest(m, 0.5), ended(m)
+        c.velocity = sign * 0.9
+        assert m.drift(p, c, 0.5 + sign * 0.1, sign * 0.9, 1e-3)
+        assert (state(c), c.mode) == ((0.5 + sign * 0.1, sign * 0.9, 0.0), m.LED)
+        assert m.drift(p, c, 0.5, sign * 0.9, 1e-3)
+        assert not m.drift(p, c, 0.5, sign * 1.1, 1e-3)
+        assert c.velocity == sign * 1.0
+        assert m.drift(p, c, 0.5 + sign * 0.29, sign * 0.9, 1e-3)  # slower again: 0.9 m/s takes 0.2025 m
+        assert m.drift(p, c, 0.5 + sign * 0.2938, sign * 0.9, 1e-3)
+        assert not m.drift(p, c, 0.5 + sign * 0.294, sign * 0.9, 1e-3)  # four samples farther, 3.6 mm, it is too late
+        c.velocity = sign * 0.8
+        assert not m.drift(p, c, 0.5 + sign * 0.2, sign * 0.9, 1e-3)  # on its way to 1.3 m/s
+        c.velocity = -sign * 0.1
+        assert m.drift(p, c, 0.5 + sign * 0.51, -sign * 0.1, 1e-3)  # beyond the end, on its way back
+        before = c.position
+        for nowhere in (nan, 2e9, -2e9):
+            assert not m.drift(p, c, nowhere, 0.0, 1e-3)
+        assert c.position == before

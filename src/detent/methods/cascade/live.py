@@ -172,15 +172,16 @@ def go_along(
     p: CascadeControllerParams, c: CascadeController, memory: CascadeLive, here: PositionSensor, s: Stream
 ) -> int:  # fmt: skip
     """One sample along a stream; gives why it goes on no longer, 0 while it does."""
-    limits, course, period = memory.limits, memory.course, p.law.period
+    limits, course, period, rate = memory.limits, memory.course, p.law.period, 0.0
     if s.quantity == POSITION:
-        follow(limits, course, s.value, s.slope, s.bend, period)
+        rate = s.bend if follow(limits, course, s.value, s.slope, period) else 0.0
     elif s.quantity != EFFORT:
-        follow(limits, course, course.position + s.value * period, s.value, s.slope, period)
-    elif drift(limits, course, here.position, here.velocity):
+        rate = s.slope if follow(limits, course, course.position + s.value * period, s.value, period) else 0.0
+    elif drift(limits, course, here.position, here.velocity, period):
         open_loops(c, min(max(s.value, -1.0), 1.0) * p.law.max_command)
     else:
         return DRIVEN_OFF
+    c.reference.acceleration = min(max(rate, -limits.acceleration), limits.acceleration)
     return 0
 
 
@@ -206,8 +207,8 @@ def serve(  # noqa: PLR0913 - as all of its kind
         a.refused = go_along(p, c, memory, here, o.stream)
     else:
         advance(memory.limits, course, p.law.period)
+        c.reference.acceleration = course.acceleration
     c.reference.position, c.reference.velocity = course.position, course.velocity
-    c.reference.acceleration = course.acceleration
     a.position, a.velocity = here.position, here.velocity
     a.commanded, a.commanded_velocity = course.position, course.velocity
     a.error = course.position - here.position
