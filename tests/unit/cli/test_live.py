@@ -14,6 +14,8 @@ from typer.testing import CliRunner, Result
 
 from detent.cli import app
 from detent.cli import live as commands
+from detent.cli.live import _about
+from detent.errors import DetentError
 from detent.operate.audit import Audit
 from detent.operate.channel import Channel, channel_of
 from detent.operate.host import Log
