@@ -229,9 +229,11 @@ def test_set_points_are_played_in_turn_and_end_at_the_last_one() -> None:
         stream = axis.link.host.board.operation.stream  # pyright: ignore[reportAttributeAccessIssue]
         assert (stream.taken, stream.late, stream.dropped) == (300, 0, 0)
         assert axis.position == pytest.approx(0.021, abs=2e-6)
-        axis.stream([0.01] * 60, of="velocity", period="2 ms", wait=False).wait()
+        axis.stream([0.01] * 60, of="velocity", period="2 ms")
         assert axis.position == pytest.approx(0.021 + 60 * 2e-3 * 0.01, abs=1e-4)
-        under_way = axis.stream([axis.position] * 500, wait=False)
+        under_way = axis.do("stream_position", "1 ms", wait=False)
+        axis.link.points(under_way.id, [axis.position] * 50, in_turn=True)
+        axis.link.host.run(5)  # pyright: ignore[reportAttributeAccessIssue]
         axis.stop()
         with pytest.raises(CommandError) as ended:
             under_way.wait()
