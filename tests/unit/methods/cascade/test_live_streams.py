@@ -1,10 +1,16 @@
 """The cascade axis under set-points that somebody sends: where its limits hold, and what a session repeats."""
 
+import hashlib
+import os
+import subprocess
+import sys
 from typing import Any
 
+import numba
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.live_bench import Bench
+from tests.places import ROOT
 from tests.unit.control.test_operation import Desk
 
 from detent.control import operation as ops
@@ -123,3 +129,42 @@ def test_methods_that_command_in_pulses_or_positions_of_their_own_refuse(name):
     desk = Desk(takes=made.live.operation.takes, look=PERIOD).enabled()
     assert desk.ask(ops.STREAM_POSITION, PERIOD) == desk.last[0]
     assert desk.last[1:3] == (ops.REFUSED, ops.NOT_OFFERED)
+
+
+@pytest.mark.parametrize(("mode", "offered"), [("torque", [1, 1, 1]), ("velocity", [1, 1, 0]), ("position", [1, 1, 0])])
+def test_loops_that_are_closed_elsewhere_are_not_opened(mode, offered):
+    made: Any = METHODS["cascade"].wired(load_spec(EXAMPLES / "cascade.toml"), operation_params(), "", mode)[0]
+    assert [made.live.operation.takes >> kind & 1 for kind in ops.STREAMS] == offered
+
+
+def played() -> str:
+    """Hash of an axis that was streamed positions, velocities and efforts, each until they were lost."""
+    axis = Bench("cascade")
+    axis.host.run(3)
+    axis.do(ops.ENABLE)
+    axis.do(ops.CONFIRM)
+    begin = axis.answer.commanded
+    for kind, values, left in (
+        (ops.STREAM_POSITION, [begin + 1.3e-6 * k * k for k in range(40)], 80),
+        (ops.STREAM_VELOCITY, [-1.1e-3 * k for k in range(60)], 80),
+        (ops.STREAM_EFFORT, [-0.3] * 60, 60),
+    ):
+        stream = axis.host.ask(kind, PERIOD)
+        axis.host.run(1)
+        for value in values:
+            axis.host.ask(ops.POINT, value, id=stream)
+            axis.host.run(1)
+        axis.host.run(left)
+        assert axis.host.until_ended(stream).why == ops.LEASE_LOST
+    return hashlib.sha256(bytes(axis.host.axis.state) + bytes(axis.operation)).hexdigest()
+
+
+@pytest.mark.compiled
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="compares compiled code with plain Python")
+def test_plain_python_follows_with_the_same_bits():
+    command = "from tests.unit.methods.cascade.test_live_streams import played; print(played())"
+    plain = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", command], cwd=ROOT, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}", "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert plain.stdout.strip() == played(), plain.stderr[-2000:]
