@@ -120,6 +120,34 @@ def test_15_lost_set_points_end_in_a_ramp_and_are_not_taken_up_again(tmp_path):
         assert axis.state.controller.guard.code == 0
 
 
+def test_15_a_halt_ends_it_and_its_release_begins_it_anew(tmp_path):
+    with stepped(tmp_path) as axis, master_of(axis, "fifteen halt") as (node, network):
+        with axis.running():
+            node.op_mode = "CYCLIC SYNCHRONOUS POSITION"
+            node.state = "OPERATION ENABLED"
+            axis.until(lambda: node.sdo[0x6041].raw & 0x1000)
+        cycle = Cycle(axis, node, network)
+        for k in range(50):
+            cycle(20_000 + 2 * k * k)
+        first = axis.operation.running
+        with axis.running():
+            node.sdo[0x6040].raw = 0x10F
+            axis.until(lambda: axis.operation.running == 0 and axis.operation.answer.rests)
+            axis.until(lambda: not node.sdo[0x6041].raw & 0x1000)
+            node.sdo[0x6040].raw = 0x0F
+            axis.until(lambda: node.sdo[0x6041].raw & 0x1000)
+        assert axis.operation.running > first
+        here = round(axis.operation.answer.commanded / COUNT)
+        for k in range(50):
+            cycle(here + k)
+        assert axis.operation.answer.commanded == pytest.approx((here + 49) * COUNT)
+        with axis.running():  # a relative way counts from there
+            node.op_mode = "PROFILED POSITION"
+            node.sdo[0x607A].raw = 1_000
+            node.sdo[0x6040].raw = 0x5F
+            axis.until(lambda: abs(axis.operation.answer.position / COUNT - here - 1_049) < 20)
+
+
 @pytest.mark.wide
 def test_15_through_the_process_of_the_face_in_wall_time(tmp_path):
     with wire() as (ours, theirs), faced(tmp_path, "--headless", "--canopen", f"slcan:{ours}@5") as live:

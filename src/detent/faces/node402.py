@@ -305,6 +305,8 @@ class Node:
 
     def _choose(self, mode: int) -> None:
         if mode and mode != self._mode:
+            if self._mode in MODES:  # a way counts from where that has led
+                self.set_points.drop(self.axis.counts)
             self._mode, self._anew = mode, True
             if mode in MODES or self.cyclic.follows:
                 self._words.put_nowait(None)
@@ -357,6 +359,7 @@ class Node:
         anew, self._anew = self._anew or bool(before & HALT), False
         if self.cyclic.follows and (anew or self.cyclic.mode != self._mode):
             await self.axis.stop()
+            self.set_points.drop(self.axis.counts)
         if word_ & HALT and not before & HALT:
             self.set_points.drop(self.axis.counts)
             await self.axis.stop()
