@@ -34,6 +34,7 @@ class Stepped:
         self.channels = {"": self.channel.path}
         self.state: Any = self.host.axis.state
         self.operation = self.host.board.operation
+        self.host.run(1)  # compiles, while nobody waits
 
     def step(self, periods: int = 1) -> None:
         """Let periods pass; nobody else takes note meanwhile."""

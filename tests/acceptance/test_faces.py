@@ -780,7 +780,8 @@ def test_17_a_lost_master(still, option, state):
 
 
 TABLE = """
-1000 0 u32 ro 00020192|1001 0 u8 ro 0|1016 1 u32 rw 0|1017 0 u16 rw 0|1018 2 u32 ro 402|6007 0 i16 rw 3|603F 0 u16 ro 0
+1000 0 u32 ro 00020192|1001 0 u8 ro 0|100C 0 u16 rw 0|100D 0 u8 rw 0
+1016 1 u32 rw 0|1017 0 u16 rw 0|1018 2 u32 ro 402|6007 0 i16 rw 3|603F 0 u16 ro 0
 6040 0 u16 rw 0|6041 0 u16 ro *|605A 0 i16 ro 6|605E 0 i16 ro 2|6060 0 i8 rw 1|6061 0 i8 ro 1|6062 0 i32 ro *
 6064 0 i32 ro *|6065 0 u32 ro FFFFFFFF|6066 0 u16 ro 0|6067 0 u32 ro FFFFFFFF|6068 0 u16 ro 0|606C 0 i32 ro *
 6077 0 i16 ro *|607A 0 i32 rw 0|607D 1 i32 rw 0|607D 2 i32 rw 7A120|607F 0 u32 ro 7A120|6081 0 u32 rw 7A120

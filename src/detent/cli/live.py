@@ -307,6 +307,10 @@ def connect(
 
 def _about(word: str, value: str | None, second: str | None) -> object:
     """What a word is about: a value, two of them, or a file, whose place does not depend on who opens it."""
+    if word.startswith("stream_"):
+        raise DetentError(
+            f"connect: got {word}; expected: a command that one line says; send set-points from Python: axis.stream()"
+        )
     if word in ("export", "import") and value is not None:
         return str(Path(value).absolute())
     return value if second is None else [value, second]

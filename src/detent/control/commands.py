@@ -42,14 +42,12 @@ from detent.control.operation import (
     OFF,
     ORDER,
     PAUSE,
-    POINTS,
     REFUSED,
     RESET,
     RESUME,
     SECOND,
     STALE,
     STOP,
-    STREAMS,
     TAKE,
     TRUST,
     UNKNOWN,
@@ -61,6 +59,8 @@ from detent.control.operation import (
     end,
     end_running,
     halt,
+    is_point,
+    is_stream,
     leave_torque,
     off,
     stop,
@@ -92,13 +92,13 @@ def obey(q: OperationParams, o: Operation, r: Request) -> None:
         off(o, r.id)
         end(o, r.id, DONE, 0, 0)
         return
-    if r.kind in POINTS:
+    if is_point(r.kind):
         take_set_point(o, r)
         return
     why = why_not(q, o, r)
     if why:
         end(o, r.id, REFUSED, why, 0)
-    elif r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, JOB) or r.kind in STREAMS:
+    elif r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, JOB) or is_stream(r.kind):
         begin_motion(q, o, r)
     else:
         manage(q, o, r)
@@ -132,7 +132,7 @@ def why_not(q: OperationParams, o: Operation, r: Request) -> int:
 @step
 def why_not_now(q: OperationParams, o: Operation, r: Request) -> int:
     """Reason to refuse a request of an axis without a fault, 0 for none."""
-    if r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, CONFIRM, JOB) or r.kind in STREAMS:
+    if r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, CONFIRM, JOB) or is_stream(r.kind):
         return why_not_move(q, o, r)
     if r.kind in (LOWER, UPPER):
         return 0 if can_move_end(q, o, r) else BEYOND

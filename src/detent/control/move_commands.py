@@ -24,7 +24,6 @@ from detent.control.operation import (
     SEEK,
     STREAM_POSITION,
     STREAM_VELOCITY,
-    STREAMS,
     TRAVEL,
     UNREFERENCED,
     WORK,
@@ -33,6 +32,7 @@ from detent.control.operation import (
     Request,
     end_running,
     halt,
+    is_stream,
     tell,
 )
 from detent.control.stream import open_stream, point_in_turn, point_now
@@ -48,13 +48,13 @@ def why_not_move(q: OperationParams, o: Operation, r: Request) -> int:
         return NOT_ENABLED
     if q.one_at_a_time and o.running and r.kind != CONFIRM:
         return BUSY
-    if o.trust == NOT_KNOWN and (r.kind in (MOVE_TO, GO, JOB) or (r.kind in STREAMS and r.kind != STREAM_VELOCITY)):
+    if o.trust == NOT_KNOWN and (r.kind in (MOVE_TO, GO, JOB) or (is_stream(r.kind) and r.kind != STREAM_VELOCITY)):
         return UNREFERENCED
     if r.kind == JOB and q.careful and not (o.confirmed or q.performs):  # it goes at speeds of its own
         return NOT_CONFIRMED
     if r.kind in (MOVE_TO, MOVE_BY) and not is_allowed(q, o, goal(o, r)):
         return BEYOND
-    if r.kind in STREAMS and not 0.5 * q.look < r.value <= LONGEST_PERIOD:
+    if is_stream(r.kind) and not 0.5 * q.look < r.value <= LONGEST_PERIOD:
         return NOT_FINITE
     return 0
 
@@ -112,7 +112,7 @@ def begin_motion(q: OperationParams, o: Operation, r: Request) -> None:
         tell(o, NUMBERED)
     elif r.kind == HOME:
         tell(o, SEEK)
-    elif r.kind in STREAMS:
+    elif is_stream(r.kind):
         looks = max(1, round(r.value / q.look))
         open_stream(o.stream, r.kind - STREAM_POSITION + 1, looks, looks * q.look)
         if o.answer.rests == 0:
@@ -133,7 +133,7 @@ def begin_motion(q: OperationParams, o: Operation, r: Request) -> None:
 def take_set_point(o: Operation, r: Request) -> None:
     """A set-point of the stream that is under way; one of another, or that is no number, is dropped and counted."""
     s = o.stream
-    if o.kind not in STREAMS or r.id != o.running or r.client != o.client or not abs(r.value) < 1e12:
+    if not is_stream(o.kind) or r.id != o.running or r.client != o.client or not abs(r.value) < 1e12:
         s.dropped += 1
         return
     here = o.answer.commanded if o.kind == STREAM_POSITION else 0.0

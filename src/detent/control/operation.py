@@ -189,6 +189,18 @@ def end_running(o: Operation, how: int, why: int, by: int) -> None:
 
 
 @hot_step
+def is_stream(kind: int) -> bool:
+    """One of `STREAMS`."""
+    return STREAM_POSITION <= kind <= STREAM_EFFORT
+
+
+@hot_step
+def is_point(kind: int) -> bool:
+    """One of `POINTS`."""
+    return POINT <= kind <= LAST_POINT
+
+
+@hot_step
 def tell(o: Operation, do: int) -> None:
     """Tell the method to do something else."""
     o.demand.do = do
@@ -299,7 +311,7 @@ def look(o: Operation) -> None:
         if o.lease == 0:
             end_running(o, FAILED, LEASE_LOST, 0)
             halt(o)
-    if o.kind in STREAMS:
+    if is_stream(o.kind):
         lead_along(o)
 
 
@@ -323,7 +335,7 @@ def lead_along(o: Operation) -> None:
 def judge(q: OperationParams, o: Operation) -> None:
     """After the method has answered: did it take the demand, and is the command done."""
     a, d = o.answer, o.demand
-    was_led = a.refused != 0 and o.kind in STREAMS
+    was_led = a.refused != 0 and is_stream(o.kind)
     if a.refused:  # in the look in which it was told, or later: a controller may need time to find out
         failed = (o.kind == JOB and q.performs) or (was_led and d.fresh == 0)
         end_running(o, FAILED if failed else REFUSED, a.refused, 0)
@@ -340,7 +352,7 @@ def judge(q: OperationParams, o: Operation) -> None:
         o.last_stop = abs(a.commanded - o.stop_from)
     if o.kind == STOP:
         end_running(o, DONE, 0, 0)
-    streams = o.kind in STREAMS and o.stream.closing != CLOSED
+    streams = is_stream(o.kind) and o.stream.closing != CLOSED
     if o.running and o.kind != ENABLE and not streams and not (o.kind == JOG and d.velocity != 0.0):
         o.within = o.within + 1 if a.near else 0
         o.outside = 0 if a.near else o.outside + 1

@@ -16,6 +16,7 @@ from canopen.objectdictionary.datatypes import INTEGER8, INTEGER16, INTEGER32, U
 from detent.control.axis_states import ENABLED, FAULT, HALT_QUICKLY, QUICK_STOP, STATE_NAMES, ordered
 from detent.errors import DetentError
 from detent.faces.cyclic import MODES, Cyclic, cycle, supported
+from detent.faces.guarding import GUARD_TIME, LIFE_TIME_FACTOR, Guarding
 from detent.faces.service import LEASE_LOST, AxisService, Desk, NotDoneError
 from detent.faces.set_points import HALT, SetPoints
 from detent.operate.drivers import cia402 as c
@@ -26,6 +27,7 @@ VOLTAGE, REMOTE, REACHED, LIMIT, MODE_BIT, MODE_ERROR = 0x10, 0x200, 0x400, 0x80
 POSITION, VELOCITY, HOMING = 1, 3, 6
 SUPPORTED = 1 << 0 | 1 << 2 | 1 << 5
 NO_MASTER = 0x8130
+RESETS = 0x81, 0x82  # commands of the network master: of the node, of its communication
 HEARTBEAT, GENERIC, COMMUNICATION = 0x700, 0x01, 0x10  # identifier; bits of the error register
 TOO_LARGE, OTHER_VALUE = 0x06090031, 0x06090030
 ERRORS = {1: 0x7305, 10: 0x8611, 11: 0x8400, 12: 0x7121, 20: 0x2310, 21: 0x2350, 30: 0x8612, 40: 0x7500, 50: 0x6100}
@@ -43,6 +45,7 @@ def objects_of(axis: AxisService) -> tuple[c.Entry, ...]:
     # fmt: off
     return (
         e(0x1000, "Device type", UNSIGNED32, "ro", 0x00020192), e(0x1001, "Error register", UNSIGNED8, "ro"),
+        e(GUARD_TIME, "Guard time", UNSIGNED16), e(LIFE_TIME_FACTOR, "Life time factor", UNSIGNED8),
         e(0x1017, "Producer heartbeat time", UNSIGNED16),
         e(c.ABORT, "Abort connection option code", INTEGER16, "rw", 3),
         e(c.ERROR_CODE, "Error code", UNSIGNED16, "ro"), e(c.CONTROL, "Controlword", UNSIGNED16),
@@ -127,6 +130,7 @@ class Node:
             parts[0].default = sum(1 for k in range(1, 5) if parts[k].default)
         self.node: Any = canopen.LocalNode(node, dictionary)
         self.set_points, self.cyclic, self._anew = SetPoints(axis.counts), Cyclic(axis, self.publish), False
+        self._guarding = Guarding(self.node)
         self._asked = 0  # control word that was written last
         self._words: asyncio.Queue[int | None] = asyncio.Queue()
         self._word, self._mode, self._error, self._told_fault = 0, POSITION, 0, 0
@@ -144,8 +148,19 @@ class Node:
         network[self.node.id] = self.node
         self._listen()
         network.subscribe(c.SYNC, self._sync)
+        network.notifier.add_listener(self._guarding)
+        network.subscribe(0, self._command)
+        self._boot()
+
+    def _boot(self) -> None:
+        self._guarding.begin_anew()
         self.node.nmt.send_command(0)
         self.node.nmt.send_command(128)
+
+    def _command(self, _id: int, data: bytearray, _moment: float) -> None:
+        """The library does the commands of the network master but for what follows a reset: the node boots."""
+        if len(data) == 2 and data[0] in RESETS and data[1] in (0, self.node.id):
+            self._boot()
 
     def _listen(self) -> None:
         """Take the process data as they are mapped now."""
@@ -289,6 +304,8 @@ class Node:
 
     def _choose(self, mode: int) -> None:
         if mode and mode != self._mode:
+            if self._mode in MODES:  # a way counts from where that has led
+                self.set_points.drop(self.axis.counts)
             self._mode, self._anew = mode, True
             if mode in MODES or self.cyclic.follows:
                 self._words.put_nowait(None)
@@ -341,6 +358,7 @@ class Node:
         anew, self._anew = self._anew or bool(before & HALT), False
         if self.cyclic.follows and (anew or self.cyclic.mode != self._mode):
             await self.axis.stop()
+            self.set_points.drop(self.axis.counts)
         if word_ & HALT and not before & HALT:
             self.set_points.drop(self.axis.counts)
             await self.axis.stop()
@@ -426,7 +444,8 @@ class Node:
         """Look after the master: gone for too long, it is as 6007 says."""
         while True:
             await asyncio.sleep(LOOK)
-            if not 0.0 < self._limit < time.monotonic() - self._heard or self._error:
+            silent = 0.0 < self._limit < time.monotonic() - self._heard
+            if not (silent or self._guarding.is_lost()) or self._error:
                 continue
             option, self._limit = self._signed(c.ABORT), 0.0  # until it asks to be watched again
             self.axis.let_go()  # a velocity ends with its lease, whatever the option

@@ -250,13 +250,11 @@ class LiveAxis:
                 left.set()
         return command
 
-    def stream(
-        self, points: Sequence[float], *, of: str = "position", period: float | str = 1e-3, wait: bool = True
-    ) -> Command:
+    def stream(self, points: Sequence[float], *, of: str = "position", period: float | str = 1e-3) -> Command:
         """Follow set-points, one in each interpolation period [s], and come to rest at the last one.
 
-        `of` says what they are: positions [m] or [rad], velocities, or of an "effort" shares of its limit. The axis
-        takes them in turn, some ahead of time; where they stop coming it stops within six of their periods.
+        `of` says what they are: a "position" [m] or [rad], a "velocity", or an "effort", a share of its limit. They are
+        sent ahead of their time while this blocks; where they stop coming the axis stops within six of their periods.
 
         Examples
         --------
@@ -267,22 +265,12 @@ class LiveAxis:
         ...     print(f"{axis.position:.4f} m")
         0.0210 m
         """
-        command, left = self.do(f"stream_{of}", period, wait=False), [*points]
-
-        def feed() -> None:
-            """Send them as there is room."""
-            rest = left
-            while rest:
-                taken = self.link.points(command.id, rest[:AHEAD], in_turn=True, last=len(rest) <= AHEAD)
-                rest = rest[taken:]
-                with suppress(TimeoutError):
-                    self.link.wait(command.id, LOOK)
-                    return
-
-        if not wait:
-            threading.Thread(target=feed, name="stream", daemon=True).start()
-            return command
-        feed()
+        command, rest = self.do(f"stream_{of}", period, wait=False), [*points]
+        while rest and not command.done:
+            taken = self.link.points(command.id, rest[:AHEAD], in_turn=True, last=len(rest) <= AHEAD)
+            rest = rest[taken:]
+            with suppress(TimeoutError):
+                self.link.wait(command.id, LOOK)
         command.wait()
         return command
 

@@ -23,6 +23,7 @@ FARTHEST = 1e9  # no place is farther from 0 [m]
 LEAST, LARGEST = 1e-9, 1e12  # what a speed, an acceleration, a jerk may be limited to [m/s, m/s^2, m/s^3]
 LONGEST_PERIOD = 1.0  # of a sample [s]
 STRETCHES = 7  # of constant jerk: three of driving, one at speed, three of the stop
+SOON = 4  # samples that an axis without its loops is looked ahead
 HALVINGS = 100  # of the time in which the stop must begin
 ROUNDING = 1e-13  # what two ways to reckon a place may differ by, of the lengths that take part
 
@@ -409,13 +410,18 @@ def begin_to_be_led(p: CourseLimits, c: Course) -> None:
 
 
 @step
-def drift(p: CourseLimits, c: Course, position: float, velocity: float) -> bool:
-    """One sample of a course that is where the axis is; False where that goes too fast, or a stop comes too late."""
+def drift(p: CourseLimits, c: Course, position: float, velocity: float, period: float) -> bool:
+    """One sample of a course that is where the axis is; False where that goes too fast, or a stop would come too late.
+
+    It is reckoned with the velocity that a few samples more would bring, for a stop does not act at once.
+    """
     if not is_usable(p) or not -FARTHEST <= position <= FARTHEST:
         return False
     begin_to_be_led(p, c)
+    gain = velocity - c.velocity
+    soon = velocity + SOON * gain if gain * velocity > 0.0 else velocity
     c.position, c.velocity, c.acceleration = position, min(max(velocity, -p.speed), p.speed), 0.0
-    return abs(velocity) <= p.speed and not is_past(c.limits, position, position, velocity)
+    return abs(velocity) <= p.speed and not is_past(c.limits, position, position + soon * SOON * period, soon)
 
 
 @step

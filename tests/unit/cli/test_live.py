@@ -16,7 +16,9 @@ from typer.testing import CliRunner, Result
 import detent
 from detent.cli import app
 from detent.cli import live as commands
+from detent.cli.live import _about
 from detent.cli.running import places
+from detent.errors import DetentError
 from detent.operate.audit import Audit
 from detent.operate.channel import Channel, channel_of, running_channel
 from detent.operate.host import Log
@@ -223,3 +225,8 @@ def test_asked_once_or_often_it_is_heard() -> None:
     for _ in range(1 << 17):  # more than a pipe holds
         ending.ask(2, None)
     assert ending.wait(0.0)
+
+
+def test_a_stream_is_nothing_for_a_line():
+    with pytest.raises(DetentError, match="connect: got stream_position; expected: a command that one line says"):
+        _about("stream_position", "1 ms", None)

@@ -218,3 +218,69 @@ def test_signals_that_come_all_at_once_end_it(running: Running) -> None:
     for number in (signal.SIGINT, signal.SIGTERM) * 50:
         running.process.send_signal(number)
     assert running.ended()["state"] == "switch on disabled"
+
+
+def test_set_points_are_played_in_turn_and_end_at_the_last_one() -> None:
+    with detent.live(detent.example("cascade.toml"), wall=False) as axis:
+        axis.enable()
+        axis.confirm()
+        way = [0.02 + 1e-7 * min(k, 100) ** 2 for k in range(300)]
+        axis.stream(way)
+        stream = axis.link.host.board.operation.stream  # pyright: ignore[reportAttributeAccessIssue]
+        assert (stream.taken, stream.late, stream.dropped) == (300, 0, 0)
+        assert axis.position == pytest.approx(0.021, abs=2e-6)
+        axis.stream([0.01] * 60, of="velocity", period="2 ms")
+        assert axis.position == pytest.approx(0.021 + 60 * 2e-3 * 0.01, abs=1e-4)
+        under_way = axis.do("stream_position", "1 ms", wait=False)
+        axis.link.points(under_way.id, [axis.position] * 50, in_turn=True)
+        axis.link.host.run(5)  # pyright: ignore[reportAttributeAccessIssue]
+        axis.stop()
+        with pytest.raises(CommandError) as ended:
+            under_way.wait()
+        assert ended.value.args[0].startswith("stream_position aborted")
+
+
+@pytest.mark.parametrize(
+    ("period", "told"),
+    [
+        ("0.5 ms", "a stream with a set-point every 500 us; expected: 1 ms, the period of the loop, to 1 s"),
+        (2.0, "a stream with a set-point every 2 s; expected: 1 ms"),
+        ("3 mm", "'3 mm' is not a value such as \"1 ms\""),
+        (float("inf"), "a stream with a set-point every inf"),
+        (None, 'a command with nothing; it needs a value such as "1 ms"'),
+    ],
+)
+def test_what_is_no_interpolation_period_is_said(period: object, told: str) -> None:
+    with detent.live(detent.example("cascade.toml"), wall=False) as axis, pytest.raises(DetentError) as refused:
+        axis.do("stream_position", period)
+    assert str(refused.value).startswith(told)
+
+
+def test_set_points_that_are_none_are_told_and_those_of_nobody_change_nothing() -> None:
+    with detent.live(detent.example("cascade.toml"), wall=False) as axis:
+        axis.enable()
+        axis.confirm()
+        for wrong in ("x", [True], [float("nan")], [1e12], [None]):
+            with pytest.raises(DetentError, match=r"points: got .*; expected: numbers below 1e\+12"):
+                axis.link.points(3, wrong)  # type: ignore[arg-type]
+        with pytest.raises(DetentError, match="points: got -1; expected a whole number"):
+            axis.link.points(-1, [0.0])
+        before = axis.position
+        assert axis.link.points(99, [0.1]) == 1
+        axis.link.host.run(5)  # pyright: ignore[reportAttributeAccessIssue]
+        assert axis.position == pytest.approx(before, abs=2e-6)
+        assert axis.link.host.board.operation.stream.dropped == 1  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_another_process_plays_set_points_over_the_channel(tmp_path: Path) -> None:
+    with live_folder(tmp_path) as made:
+        file = made / "axis.toml"
+        file.write_text(Path(detent.example("cascade.toml")).read_text(encoding="utf-8"), encoding="utf-8")
+        Running(file, "--headless", "--no-store", "--period", "10 ms")
+        with detent.connect(file) as axis:
+            axis.enable()
+            axis.confirm()
+            begin = axis.position
+            axis.stream([begin + 1e-5 * min(k, 100) for k in range(150)], period="10 ms")
+            assert axis.position == pytest.approx(begin + 1e-3, abs=1e-5)
+            assert axis.link.points(1, [0.0] * 2) == 2  # type: ignore[attr-defined]

@@ -821,20 +821,26 @@ def test_nothing_is_led_by_limits_or_in_times_that_are_none(m):
         assert not m.follow(p, c, 0.5001, 0.1, period)
         assert (c.position, c.mode) == (0.5, m.REST)
     assert m.follow(ended(m), c, 0.5001, 1e-4, 1.0)
-    assert not m.drift(m.CourseLimits(), c, 0.5, 0.0)
+    assert not m.drift(m.CourseLimits(), c, 0.5, 0.0, 1e-3)
 
 
 def test_a_course_drifts_with_its_axis_as_far_as_a_stop_allows(m):
     for sign in (1.0, -1.0):
         c, p = at_rest(m, 0.5), ended(m)
-        assert m.drift(p, c, 0.5 + sign * 0.1, sign * 0.9)
+        c.velocity = sign * 0.9
+        assert m.drift(p, c, 0.5 + sign * 0.1, sign * 0.9, 1e-3)
         assert (state(c), c.mode) == ((0.5 + sign * 0.1, sign * 0.9, 0.0), m.LED)
-        assert m.drift(p, c, 0.5, sign * 1.0)
-        assert not m.drift(p, c, 0.5, sign * 1.1)
+        assert m.drift(p, c, 0.5, sign * 0.9, 1e-3)
+        assert not m.drift(p, c, 0.5, sign * 1.1, 1e-3)
         assert c.velocity == sign * 1.0
-        assert not m.drift(p, c, 0.5 + sign * 0.45, sign * 0.9)  # a stop takes 0.2 m
-        assert m.drift(p, c, 0.5 + sign * 0.51, -sign * 0.1)  # beyond the end, on its way back
+        assert m.drift(p, c, 0.5 + sign * 0.29, sign * 0.9, 1e-3)  # slower again: 0.9 m/s takes 0.2025 m
+        assert m.drift(p, c, 0.5 + sign * 0.2938, sign * 0.9, 1e-3)
+        assert not m.drift(p, c, 0.5 + sign * 0.294, sign * 0.9, 1e-3)  # four samples farther, 3.6 mm, it is too late
+        c.velocity = sign * 0.8
+        assert not m.drift(p, c, 0.5 + sign * 0.2, sign * 0.9, 1e-3)  # on its way to 1.3 m/s
+        c.velocity = -sign * 0.1
+        assert m.drift(p, c, 0.5 + sign * 0.51, -sign * 0.1, 1e-3)  # beyond the end, on its way back
         before = c.position
         for nowhere in (nan, 2e9, -2e9):
-            assert not m.drift(p, c, nowhere, 0.0)
+            assert not m.drift(p, c, nowhere, 0.0, 1e-3)
         assert c.position == before

@@ -177,7 +177,7 @@ def go_along(
         rate = s.bend if follow(limits, course, s.value, s.slope, period) else 0.0
     elif s.quantity != EFFORT:
         rate = s.slope if follow(limits, course, course.position + s.value * period, s.value, period) else 0.0
-    elif drift(limits, course, here.position, here.velocity):
+    elif drift(limits, course, here.position, here.velocity, period):
         open_loops(c, min(max(s.value, -1.0), 1.0) * p.law.max_command)
     else:
         return DRIVEN_OFF

@@ -1,16 +1,24 @@
 """The cascade axis under set-points that somebody sends: where its limits hold, and what a session repeats."""
 
+import hashlib
+import os
+import subprocess
+import sys
 from typing import Any
 
+import numba
 import pytest
 from tests.acceptance.test_golden_bits import EXAMPLES
 from tests.live_bench import Bench
+from tests.places import ROOT
+from tests.unit.control.test_operation import Desk
 
 from detent.control import operation as ops
 from detent.errors import DRIVEN_OFF, TOO_FAR
 from detent.methods.load import load_spec
 from detent.methods.registry import METHODS
-from detent.operate.host import Host, repeat
+from detent.operate.faults import injection_of
+from detent.operate.host import operation_params, repeat
 
 PERIOD = 1e-3
 
@@ -103,7 +111,7 @@ def test_the_guard_goes_on_under_an_effort():
     axis = Streamed()
     axis.begin(ops.STREAM_EFFORT)
     axis.send(*[0.2] * 20)
-    kind, amount = injection(axis.host, "encoder stuck")
+    kind, amount = injection_of(axis.host.axis.places, "encoder stuck")
     axis.host.ask(kind, amount)
     while axis.operation.running:
         axis.send(0.6)
@@ -113,18 +121,50 @@ def test_the_guard_goes_on_under_an_effort():
     assert axis.host.axis.state.lines.enable == 0
 
 
-def injection(host: Host, text: str) -> tuple[int, float]:
-    from detent.operate.faults import injection_of
-
-    return injection_of(host.axis.places, text)
-
-
 @pytest.mark.parametrize("name", ["rotary_table", "phase_servo", "filtered_servo", "zoom", "print_head"])
 def test_methods_that_command_in_pulses_or_positions_of_their_own_refuse(name):
     spec: Any = load_spec(EXAMPLES / f"{name}.toml")
-    motor = "group_a" if name == "zoom" else ""
-    host = Host(METHODS[spec.axis.method], spec, wall=False, motor=motor)
-    host.run(1)
-    for kind in ops.STREAMS:
-        found = host.until_ended(host.ask(kind, PERIOD))
-        assert (found.how, found.why) == (ops.REFUSED, ops.NOT_OFFERED)
+    made: Any = METHODS[spec.axis.method].live(spec, operation_params(), "group_a" if name == "zoom" else "")
+    assert [made.live.operation.takes >> kind & 1 for kind in ops.STREAMS] == [0, 0, 0]
+    desk = Desk(takes=made.live.operation.takes, look=PERIOD).enabled()
+    assert desk.ask(ops.STREAM_POSITION, PERIOD) == desk.last[0]
+    assert desk.last[1:3] == (ops.REFUSED, ops.NOT_OFFERED)
+
+
+@pytest.mark.parametrize(("mode", "offered"), [("torque", [1, 1, 1]), ("velocity", [1, 1, 0]), ("position", [1, 1, 0])])
+def test_loops_that_are_closed_elsewhere_are_not_opened(mode, offered):
+    made: Any = METHODS["cascade"].wired(load_spec(EXAMPLES / "cascade.toml"), operation_params(), "", mode)[0]
+    assert [made.live.operation.takes >> kind & 1 for kind in ops.STREAMS] == offered
+
+
+def played() -> str:
+    """Hash of an axis that was streamed positions, velocities and efforts, each until they were lost."""
+    axis = Bench("cascade")
+    axis.host.run(3)
+    axis.do(ops.ENABLE)
+    axis.do(ops.CONFIRM)
+    begin = axis.answer.commanded
+    for kind, values, left in (
+        (ops.STREAM_POSITION, [begin + 1.3e-6 * k * k for k in range(40)], 80),
+        (ops.STREAM_VELOCITY, [-1.1e-3 * k for k in range(60)], 80),
+        (ops.STREAM_EFFORT, [-0.3] * 60, 60),
+    ):
+        stream = axis.host.ask(kind, PERIOD)
+        axis.host.run(1)
+        for value in values:
+            axis.host.ask(ops.POINT, value, id=stream)
+            axis.host.run(1)
+        axis.host.run(left)
+        assert axis.host.until_ended(stream).why == ops.LEASE_LOST
+    return hashlib.sha256(bytes(axis.host.axis.state) + bytes(axis.operation)).hexdigest()
+
+
+@pytest.mark.compiled
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="compares compiled code with plain Python")
+def test_plain_python_follows_with_the_same_bits():
+    command = "from tests.unit.methods.cascade.test_live_streams import played; print(played())"
+    plain = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", command], cwd=ROOT, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}", "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert plain.stdout.strip() == played(), plain.stderr[-2000:]
