@@ -19,6 +19,7 @@ CLIENTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "test_09_base_node_402_on_a_virtual_bus": ("CiA 402, virtual bus", ("canopen",)),
     "test_10_the_same_on_slcan_from_another_process": ("CiA 402, slcan", ("canopen",)),
     "test_11_the_same_on_udp_multicast_with_the_filters_that_are_printed[2]": ("CiA 402, multicast", ("canopen",)),
+    "test_15_through_the_process_of_the_face_in_wall_time": ("CiA 402, slcan, cyclic", ("canopen",)),
     "test_19_mbpoll": ("Modbus TCP", ("mbpoll",)),
     "test_20_modbus_serial": ("Modbus TCP", ("modbus-serial",)),
     "test_20_pymodbus": ("Modbus TCP", ("pymodbus",)),
@@ -29,6 +30,10 @@ CLIENTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "test_26_zaber_motion": ("Zaber ASCII", ("zaber-motion",)),
     "test_27_alpyca_focuser": ("ASCOM Alpaca, focuser", ("alpyca",)),
     "test_27_alpyca_rotator": ("ASCOM Alpaca, rotator", ("alpyca",)),
+    "test_30_a_stage_is_two_motors_of_epics_and_bluesky_visits_its_tiles": ("EPICS, two motors", ("bluesky", "ophyd")),
+    "test_30_a_stage_is_two_axes_of_grbl": ("grbl 1.1, two axes", ("grbl-streamer",)),
+    "test_30_a_stage_is_two_axes_of_gcs": ("PI GCS 2.0, two axes", ("pipython",)),
+    "test_30_a_stage_is_two_axes_of_a_zaber_device": ("Zaber ASCII, two axes", ("zaber-motion",)),
 }
 """Protocol and clients by test."""
 LOADS = {
