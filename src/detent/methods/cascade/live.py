@@ -50,6 +50,7 @@ class CascadeLiveParams(Registers):
 
     operation: OperationParams = block("times and limits")
     look_ticks: i8 = register("ticks between two looks", unit="tick")
+    period: f8 = register("time between two samples", unit="s")
     course: CourseLimits = block("what a motion may do")
     homing: HomingParams = block("how it finds its reference")
     settled: f8 = register("position error that counts as in position", unit="m")
@@ -156,7 +157,7 @@ def serve(  # noqa: PLR0913 - as all of its kind
     c.known = 0 if o.trust == NOT_KNOWN else 1
     if c.on == 0 or before == 0:  # the commanded point is where the axis is
         begin_at(course, here.position)
-    advance(memory.limits, course, p.law.period)
+    advance(memory.limits, course, q.period)
     c.reference.position, c.reference.velocity = course.position, course.velocity
     c.reference.acceleration = course.acceleration
     a.position, a.velocity = here.position, here.velocity
@@ -183,7 +184,7 @@ def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Liv
     spec, limits = host.spec, motion_limits(host.spec)
     rest_off(host.params, host.state)
     host.params.controller.guard.softly = SOFT
-    q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
+    q, memory = CascadeLiveParams(look_ticks=host.sample_ticks, period=host.period), CascadeLive()
     q.settled = host.params.controller.limits.window
     ends = spec.limits.lowest, spec.highest
     motions = (MOVE_TO, MOVE_BY, JOG) if spec.home is None else (MOVE_TO, MOVE_BY, JOG, HOME)
