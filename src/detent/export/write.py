@@ -152,7 +152,7 @@ def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[st
     options = [f"{one.__name__}.{key}" for one, key in options_of(golden.params)]
     return {
         "detent": __version__, "name": golden.unit.name, "axis": axis.name, "motor": golden.unit.motor,
-        "method": axis.method.name, "job": job,
+        "method": axis.method.name, "arithmetic": golden.unit.arithmetic, "job": job,
         "ticks": golden.ticks, "hash": f"{golden.hash.number:016x}", "flags": FLAGS,
         "values": {row.key: row.value for row in check_spec(axis.file).rows},
         "options": {key: value for key, value in told.items() if key in options},
@@ -164,6 +164,7 @@ def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[st
         "functions": len(program.order), "tick": axis.simulated.tick,
         "misra deviations": DEVIATIONS,
         "entries": {f.cname: {"loops": loops_of(program, f)} for f in program.order if f.entry},
+        "single to double": sorted(f"{w}: {t}" for w, t in program.notes.promotions),
         "not proven": {
             "ranges that only their declaration says": sorted(f"{w}: {t}" for w, t in program.notes.claims),
             "stores and arithmetic that may wrap": sorted(f"{w}: {t}" for w, t in program.notes.wraps),

@@ -2,6 +2,7 @@
 
 import builtins
 import operator
+import struct
 from typing import Any
 
 import numba.extending
@@ -10,7 +11,7 @@ from numba.core import cgutils as untyped_cgutils
 from numba.core import types
 
 from detent.kernel import single as single_module
-from detent.kernel.compiled import DOUBLE, FLOAT, SingleType, compiles, single_type
+from detent.kernel.compiled import DOUBLE, FLOAT, INT32, WORD, SingleType, compiles, single_type
 from detent.kernel.single import Single, alike
 
 extending: Any = numba.extending  # they publish no types
@@ -149,6 +150,16 @@ def _truth(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
 @compiles(builtins.float, types.float64, SingleType)
 def _float(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
     return builder.fpext(args[0], DOUBLE)
+
+
+def single_bits_of(value: float) -> int:
+    """The four bytes of the nearest `Single` as a whole number without a sign."""
+    return int.from_bytes(struct.pack("<f", Single(value)), "little")
+
+
+@compiles(single_bits_of, types.int64, types.Float)
+def _single_bits_of(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+    return builder.zext(builder.bitcast(builder.fptrunc(args[0], FLOAT), INT32), WORD)
 
 
 for _kind in (SingleType, types.Float):

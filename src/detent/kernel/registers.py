@@ -281,8 +281,15 @@ def _made_single(registers: type[Registers]) -> type[Registers]:
     hints = inspect.get_annotations(registers, eval_str=True)
     hints |= {name: f4 for name, field in fields.items() if field.follows}
     hints |= {name: blocks[field.block] for name, field in fields.items() if field.block is not None}
+    made = {name: _in_single(field) if field.follows else field for name, field in fields.items()}
     own |= {"__annotations__": hints, "__declared__": registers, "__qualname__": f"Single{registers.__qualname__}"}
-    return type(Registers)(f"Single{registers.__name__}", bases, own | dict(fields))
+    return type(Registers)(f"Single{registers.__name__}", bases, own | made)
+
+
+def _in_single(field: Field) -> Field:
+    """A declaration whose range ends at singles."""
+    ends = None if field.range is None else tuple(float(Single(end)) for end in field.range)
+    return replace(field, range=ends)  # pyright: ignore[reportArgumentType] - two
 
 
 _OF_A_CLASS = frozenset(("_fields_", "__fields__", "__dict__", "__weakref__", "__setattr__"))

@@ -23,10 +23,8 @@ EXACT = 53  # bits of a whole number that a float holds
 class Single(float):
     """A number of IEEE binary32.
 
-    >>> Single(0.1) + Single(0.2)
-    Single(0.30000001192092896)
-    >>> 2 * Single(0.1), 0.5 * Single(0.1)
-    (Single(0.20000000298023224), 0.05000000074505806)
+    >>> Single(0.1) + Single(0.2), Single(0.1) + 0.2
+    (0.30000001192092896, 0.30000000149011614)
     """
 
     __slots__ = ()
@@ -36,12 +34,6 @@ class Single(float):
         if isinstance(value, int) and value.bit_length() > EXACT:
             value = _sticky(value)
         return float.__new__(cls, ctypes.c_float(value).value)
-
-    def __repr__(self) -> str:
-        return f"Single({float(self)!r})"
-
-    def __str__(self) -> str:
-        return repr(float(self))
 
     def __abs__(self) -> "Single":
         return Single(abs(float(self)))

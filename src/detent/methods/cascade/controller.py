@@ -24,7 +24,7 @@ from detent.control.guard import (
 )
 from detent.control.supervision import Supervision, SupervisionParams, supervise, warm_up
 from detent.kernel.loop import HostArray, controls, f8_signal
-from detent.kernel.registers import CONTROLLER, PLANT, Fit, Registers, block, f8, i8, real, register, u1, declared_of
+from detent.kernel.registers import CONTROLLER, PLANT, Fit, Registers, block, f8, i8, real, register, single, u1
 from detent.kernel.single import alike
 from detent.kernel.step import hot_step, step
 from detent.sensing.home_marks import EndWires, HomeWires
@@ -315,11 +315,12 @@ def fit(p: CascadeControllerParams) -> Fit:
     sensors = p.motor_sensor, p.load_sensor
     delay, span = (max(getattr(one, name) for one in sensors) for name in ("delay", "span"))
     places = min(1 << (delay + span).bit_length(), MEMORY)
-    unused, kind = MEMORY - places, PositionSensorParams
+    unused, kind = MEMORY - places, type(p.motor_sensor)
+    state = PositionSensor if kind is PositionSensorParams else single(PositionSensor)
     return Fit(
-        {(PositionSensor, "memory"): places},
+        {(state, "memory"): places},
         {
-            (PositionSensor, "place"): (0, places - 1), (kind, "unused"): (unused, unused),
+            (state, "place"): (0, places - 1), (kind, "unused"): (unused, unused),
             (kind, "delay"): (0, max(0, places - 1 - span)), (kind, "span"): (1, max(1, span)),
         },
         {(kind, "unused"): unused},
