@@ -38,7 +38,9 @@ from detent.translate.program import Program, blocks_of
 from detent.translate.values import C_WORDS, RefusedError, Shape, Table
 
 NARROW = ("avr",)  # targets whose double is not IEEE binary64
-WIDTHS: dict[str, Width] = {one.code: one for one in (get_args(hint)[1] for hint in (u1, u2, u4, i1, i2, i4, i8, f4, f8))}
+WIDTHS: dict[str, Width] = {
+    one.code: one for one in (get_args(hint)[1] for hint in (u1, u2, u4, i1, i2, i4, i8, f4, f8))
+}
 """What an argument of a call can be."""
 AS_DECLARED = Fit()
 LARGE = 64  # elements of an array that enters the hash of every 1000th tick only if it has more

@@ -53,8 +53,9 @@ class SingleType(types.Type):
     def __init__(self) -> None:
         super().__init__(name="single")
 
-    def unify(self, _context: Any, other: Any) -> Any:
+    def unify(self, typingctx: Any, other: Any) -> Any:
         """What a variable is that is one here and another there: as an operator between both gives it."""
+        del typingctx
         if isinstance(other, types.Integer | types.Boolean):
             return self
         return types.float64 if isinstance(other, types.Float) else None
@@ -221,11 +222,11 @@ def _write_field(context: Any, builder: Any, sig: Any, args: Any, attr: str) -> 
     _store(builder, _field_address(builder, target, field.offset), field.width, wide, place)
 
 
-def compiles(function: Any, gives: types.Type | Callable[..., Any], *kinds: Any) -> Any:
+def compiles(function: Any, gives: types.Type | Callable[[Any], Any], *kinds: Any) -> Any:
     """What is decorated writes the instructions of a call of `function` with arguments of these kinds.
 
-    It takes whole numbers as int64, the rest as it comes; `gives` is the type of the result, or finds it from those of
-    the first arguments.
+    It takes whole numbers as int64, the rest as it comes; `gives` is the type of the result, or finds it from that of
+    the first argument.
     """
 
     def register(instructions: Any) -> Any:
@@ -238,8 +239,7 @@ def compiles(function: Any, gives: types.Type | Callable[..., Any], *kinds: Any)
                 if len(args) != len(kinds) or not all(map(isinstance, args, kinds)):
                     return None
                 taken = (types.int64 if isinstance(one, types.Integer) else one for one in args)
-                kind = gives if isinstance(gives, types.Type) else gives(*args[: gives.__code__.co_argcount])
-                return templates.signature(kind, *taken)
+                return templates.signature(gives if isinstance(gives, types.Type) else gives(args[0]), *taken)
 
         return extending.lower_builtin(function, *kinds)(instructions)
 

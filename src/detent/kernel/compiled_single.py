@@ -1,24 +1,26 @@
 """How compiled code computes with a `Single`: in LLVM's float, by the rules of `kernel.single`."""
 
 import builtins
-import operator
+import operator as untyped_operator
 import struct
 from typing import Any
 
 import numba.extending
 from llvmlite import ir
 from numba.core import cgutils as untyped_cgutils
-from numba.core import types
+from numba.core import types as untyped_types
 
 from detent.kernel import single as single_module
 from detent.kernel.compiled import DOUBLE, FLOAT, INT32, WORD, SingleType, compiles, single_type
 from detent.kernel.single import Single, alike
 
 extending: Any = numba.extending  # they publish no types
+types: Any = untyped_types
+operator: Any = untyped_operator
 cgutils: Any = untyped_cgutils
 
 NUMBERS = (types.Integer, types.Boolean, types.Float)
-OPERATORS = {
+OPERATORS: dict[str, tuple[Any, Any]] = {
     "fadd": (operator.add, operator.iadd), "fsub": (operator.sub, operator.isub), "fmul": (operator.mul, operator.imul),
     "fdiv": (operator.truediv, operator.itruediv),
 }  # fmt: skip
@@ -83,14 +85,14 @@ def _from_literal(context: Any, builder: Any, of: Any, to: Any, value: Any) -> A
     return _from_whole(context, builder, plain, to, context.cast(builder, value, of, plain))
 
 
-def _joint(first: Any, second: Any) -> Any:
-    """Type in which two numbers meet, of which one is a `Single`."""
-    return types.float64 if any(isinstance(one, types.Float) for one in (first, second)) else single_type
+def _joint(kinds: Any) -> Any:
+    """Type in which two numbers of these kinds meet, of which one is a `Single`."""
+    return types.float64 if types.Float in kinds else single_type
 
 
 def _brought(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
     """Two numbers in the type in which they meet."""
-    to = _joint(*sig.args)
+    to = types.float64 if any(isinstance(one, types.Float) for one in sig.args) else single_type
     return [context.cast(builder, one, of, to) for one, of in zip(args, sig.args, strict=True)]
 
 
@@ -98,7 +100,7 @@ def _brought(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
 
 
 def _operator(function: Any, instruction: str, kinds: tuple[Any, Any]) -> None:
-    @compiles(function, _joint, *kinds)
+    @compiles(function, _joint(kinds), *kinds)
     def _instructions(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # pyright: ignore[reportUnusedFunction] - numba keeps it
         return getattr(builder, instruction)(*_brought(context, builder, sig, args))
 
@@ -111,13 +113,17 @@ def _comparison(function: Any, sign: str, kinds: tuple[Any, Any]) -> None:
 
 
 def _extreme(function: Any, sign: str, kinds: tuple[Any, Any]) -> None:
-    @compiles(function, _joint, *kinds)
+    @compiles(function, _joint(kinds), *kinds)
     def _instructions(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # pyright: ignore[reportUnusedFunction] - as above
         first, second = _brought(context, builder, sig, args)
         return builder.select(builder.fcmp_ordered(sign, second, first), second, first)
 
 
-for _kinds in ((SingleType, SingleType), *((SingleType, one) for one in NUMBERS), *((one, SingleType) for one in NUMBERS)):
+for _kinds in (
+    (SingleType, SingleType),
+    *((SingleType, one) for one in NUMBERS),
+    *((one, SingleType) for one in NUMBERS),
+):
     for _instruction, _functions in OPERATORS.items():
         for _function in _functions:
             _operator(_function, _instruction, _kinds)
@@ -152,6 +158,11 @@ def _float(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
     return builder.fpext(args[0], DOUBLE)
 
 
+def _first(kind: Any) -> Any:
+    """The type of the first argument."""
+    return kind
+
+
 def single_bits_of(value: float) -> int:
     """The four bytes of the nearest `Single` as a whole number without a sign."""
     return int.from_bytes(struct.pack("<f", Single(value)), "little")
@@ -163,11 +174,13 @@ def _single_bits_of(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
 
 
 for _kind in (SingleType, types.Float):
-    @compiles(single_module.sqrt, lambda kind: kind, _kind)
+
+    @compiles(single_module.sqrt, _first, _kind)
     def _sqrt(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
         return _called(builder, "llvm.sqrt", args[0])
 
     for _value in (SingleType, *NUMBERS):
-        @compiles(alike, lambda kind: kind, _kind, _value)
+
+        @compiles(alike, _first, _kind, _value)
         def _alike(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return context.cast(builder, args[1], sig.args[1], sig.args[0])

@@ -271,10 +271,10 @@ def single(registers: type[R]) -> type[R]:
 
 def _made_single(registers: type[Registers]) -> type[Registers]:
     fields = vars(registers).get("__fields__", {})
-    bases = tuple(single(one) if issubclass(one, Registers) and one is not Registers else one
-                  for one in registers.__bases__)  # fmt: skip
+    bases: list[Any] = list(registers.__bases__)
+    bases = [single(one) if issubclass(one, Registers) and one is not Registers else one for one in bases]
     blocks = {field.block: single(field.block) for field in fields.values() if field.block is not None}
-    same = bases == registers.__bases__ and all(one is made for one, made in blocks.items())
+    same = bases == list(registers.__bases__) and all(one is made for one, made in blocks.items())
     if same and not any(field.follows for field in fields.values()):
         return registers
     own = {key: value for key, value in vars(registers).items() if key not in _OF_A_CLASS}
@@ -283,7 +283,8 @@ def _made_single(registers: type[Registers]) -> type[Registers]:
     hints |= {name: blocks[field.block] for name, field in fields.items() if field.block is not None}
     made = {name: _in_single(field) if field.follows else field for name, field in fields.items()}
     own |= {"__annotations__": hints, "__declared__": registers, "__qualname__": f"Single{registers.__qualname__}"}
-    return type(Registers)(f"Single{registers.__name__}", bases, own | made)
+    metaclass: Any = type(Registers)
+    return metaclass(f"Single{registers.__name__}", tuple(bases), own | made)
 
 
 def _in_single(field: Field) -> Field:
@@ -295,6 +296,6 @@ def _in_single(field: Field) -> Field:
 _OF_A_CLASS = frozenset(("_fields_", "__fields__", "__dict__", "__weakref__", "__setattr__"))
 
 
-def declared_of(registers: type[Registers]) -> type[Registers]:
+def declared_of(registers: Any) -> type[Registers]:
     """The class of the declaration, of one that `single` made too."""
     return registers.__declared__ or registers

@@ -14,7 +14,7 @@ import ctypes
 import math
 import operator
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 T = TypeVar("T")
 EXACT = 53  # bits of a whole number that a float holds
@@ -29,7 +29,7 @@ class Single(float):
 
     __slots__ = ()
 
-    def __new__(cls, value: float = 0.0) -> "Single":
+    def __new__(cls, value: float = 0.0) -> Self:
         """The nearest; of a whole number of any length rounded once, too."""
         if isinstance(value, int) and value.bit_length() > EXACT:
             value = _sticky(value)

@@ -367,7 +367,8 @@ def beside_single(op: type[ast.cmpop], a: Value, b: Value) -> tuple[Value, Value
     Where no single is equal to it, ``==`` stays one of doubles.
     """
     if b.is_single and a.given is not None and not a.is_single:
-        return beside_single(FLIPPED[op], b, a)[::-1]
+        b, a = beside_single(FLIPPED[op], b, a)
+        return a, b
     if not a.is_single or b.given is None or b.is_single:
         return a, b
     near = Single(b.given)

@@ -94,8 +94,8 @@ class Function:
         self.result_class: type[Registers] | None = (
             self.kinds.get(hint, hint) if isinstance(hint, type) and issubclass(hint, Registers) else None
         )
-        kinds: dict[Any, str] = {None: "none", type(None): "none", bool: "bool", float: "float", int: "int"}
-        self.result_kind = "file" if self.result_class else kinds.get(hint, "")
+        results: dict[Any, str] = {None: "none", type(None): "none", bool: "bool", float: "float", int: "int"}
+        self.result_kind = "file" if self.result_class else results.get(hint, "")
         if not self.result_kind:
             raise RefusedError("FW02", tree, f"a result {hint}", "int, float, bool, registers or None", "store it")
         self.result: Value | None = None

@@ -28,7 +28,8 @@ class RotaryCascade(Cascade):
     @classmethod
     def leaves(cls, prefix: str = "", offset: int = 0, by: str = "") -> Iterator[Leaf]:
         """Every stored quantity with its dotted path, in order of memory."""
-        return (replace(leaf, unit=rotary_unit(leaf.unit)) for leaf in cls.__base__.leaves(prefix, offset, by))
+        straight: Any = cls.__base__  # in single precision that is another class
+        return (replace(leaf, unit=rotary_unit(leaf.unit)) for leaf in straight.leaves(prefix, offset, by))
 
 
 def rotary_unit(unit: str) -> str:
@@ -127,12 +128,14 @@ class CascadeHost:
     def watch(self, samples: int) -> Rows:
         """Let samples pass, and see every one of them."""
         first = self.state.tick // self.sample_ticks + 1
-        leaves = choose_leaves(type(self.state), WATCHED)
+        leaves = choose_leaves(self.spec.registers_of(Cascade), WATCHED)
         self._picks = byte_places(leaves)
         memory = self._seen = np.zeros((samples + 1, len(self._picks)), np.uint8)
         self.pass_samples(samples)
         self._seen = None
-        return memory[np.arange(first, first + samples) % len(memory)].view([(leaf.path, "<" + leaf.width.code) for leaf in leaves])[:, 0]
+        return memory[np.arange(first, first + samples) % len(memory)].view(
+            [(leaf.path, "<" + leaf.width.code) for leaf in leaves]
+        )[:, 0]
 
 
 WATCHED = (
