@@ -118,7 +118,7 @@ class Rig:
 
         `feed` is a `profile` to follow or a `command` per sample; without, the reference stands.
         """
-        leaves = {leaf.path: leaf for leaf in Cascade.leaves()}
+        leaves = {leaf.path: leaf for leaf in type(self.r).leaves()}
         chosen = [leaves[name] for name in names]
         picks = np.concatenate([np.arange(c.offset, c.offset + c.width.size) for c in chosen]).astype(np.int64)
         dtype: Any = np.dtype([(c.path, "<" + c.width.code) for c in chosen])

@@ -8,7 +8,18 @@ import sys
 import numba
 import numpy as np
 import pytest
-from tests.cascade_rig import MASS, NO_TRACE, SAMPLE_TICKS, STANDING, T_SAMPLE, TICK, Rig, in_single, make_params, set_friction
+from tests.cascade_rig import (
+    MASS,
+    NO_TRACE,
+    SAMPLE_TICKS,
+    STANDING,
+    T_SAMPLE,
+    TICK,
+    Rig,
+    in_single,
+    make_params,
+    set_friction,
+)
 from tests.places import ROOT
 
 from detent.kernel.loop import advance
@@ -98,9 +109,7 @@ def test_it_is_determined():
 @pytest.mark.process
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="compares with compiled code; NUMBA_DISABLE_JIT is set")
 def test_plain_python_gives_the_same_bytes_as_compiled_code():
-    program = (
-        "from tests.unit.methods.cascade.test_system_bits import WHOLE, run_hash; print(*map(run_hash, WHOLE))"
-    )
+    program = "from tests.unit.methods.cascade.test_system_bits import WHOLE, run_hash; print(*map(run_hash, WHOLE))"
     environment = os.environ | {"PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}", "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(
         [sys.executable, "-c", program], env=environment, cwd=ROOT, capture_output=True, text=True, check=False
