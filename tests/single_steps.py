@@ -50,7 +50,8 @@ def halved(value: float) -> float:
 
 def comparisons(r: Mixed, a: int) -> int:
     """Beside constants that no single is equal to, the nearest on the right side decides."""
-    bits = (1 if r.x < 0.1 else 0) + (2 if 0.1 < r.x else 0) + (4 if r.x <= 0.1 else 0) + (8 if r.x >= 0.1 else 0)
+    bits = (1 if r.x < 0.1 else 0) + (2 if 0.1 < r.x else 0)  # noqa: SIM300 - both ways round
+    bits += (4 if r.x <= 0.1 else 0) + (8 if r.x >= 0.1 else 0)
     bits += (16 if abs(r.x) < 1e300 else 0) + (32 if r.x == 0.5 else 0) + (64 if r.x == 0.1 else 0)
     return bits + (128 if r.x < r.y else 0) + (256 if r.x > a else 0) + (512 if r.x != r.z else 0)
 
