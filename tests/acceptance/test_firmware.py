@@ -1183,9 +1183,10 @@ def test_18_a_step_edited_after_the_export_is_named(tmp_path):
     assert read_manifest(folder)["report"] == {}
 
 
-def test_31_a_set_exchanged_at_tick_10000_is_simulated_and_replayed_equal(tmp_path):
+@pytest.mark.parametrize("method", ["cascade", pytest.param("single", marks=pytest.mark.wide)])
+def test_31_a_set_exchanged_at_tick_10000_is_simulated_and_replayed_equal(tmp_path, method):
     needs("host-gcc")
-    axis = detent.load(detent.example("cascade.toml"))
+    axis = axis_named(method)
     rows_of = '[[move]]\nby = "300 mm"\ndwell = "{dwell}"\n'
     change = '[[parameter_change]]\ntime = "{time!r} s"\nname = "{name}"\nvalue = {value}\n'
     (tmp_path / "same.toml").write_text(rows_of.format(dwell="2 s"))

@@ -226,7 +226,7 @@ def report_lines(folder: str | Path, measured: Sequence[Measured], clock: str = 
     loops = sorted({loop for one in manifest["entries"].values() for loop in one["loops"]})
     yield f"loops: {len(loops) or 'none'}"
     yield from (f"  {loop}" for loop in loops)
-    if manifest["arithmetic"] == "single":
+    if manifest.get("arithmetic") == "single":
         rows = manifest["single to double"]
         yield f"single precision that meets double: {len(rows) or 'nowhere'}"
         yield from (f"  {row}" for row in rows)

@@ -248,12 +248,13 @@ def members(registers: Registers) -> Iterator[tuple[Field, Any]]:
 
 
 def refuse_floats(unit: ControlUnit, target: str) -> None:
-    """Refuse a unit with floats for a processor whose `double` has 32 bits (FW05)."""
+    """Refuse a unit with floats for a processor whose `double` has 32 bits (FW05): single ones meet double ones."""
     roots = {"params": unit.params, "controller": unit.controller, "lines": unit.lines}
     for root, registers in roots.items() if target in NARROW else ():
         for leaf in registers.leaves():
-            if leaf.width.is_float and leaf.width.size == 8:
-                got = f"{root}.{leaf.path}, a number of 64 bits, for {target}, whose double has 32"
+            if leaf.width.is_float:
+                bits = 8 * leaf.width.size
+                got = f"{root}.{leaf.path}, a number of {bits} bits, for {target}, whose double has 32"
                 expected = "a controller of whole numbers"
                 raise RefusedError("FW05", None, got, expected, "a variant in whole numbers, or another --target")
 

@@ -29,6 +29,7 @@ from detent.export.serial import serial_texts
 from detent.export.unit import ControlUnit, options_of, outside_ranges, refuse_floats, unit_of
 from detent.export.vectors import FORMATS, Golden, record
 from detent.files.text import write_errors
+from detent.kernel.registers import declared_of
 from detent.methods.check import check_spec
 from detent.translate.program import Function, Program
 from detent.translate.values import RefusedError
@@ -148,8 +149,8 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
 
 def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[str, Any]:
     """What an export was made from, and what is not proven of it."""
-    told = {f"{one.__name__}.{key}": value for (one, key), value in program.options.items()}
-    options = [f"{one.__name__}.{key}" for one, key in options_of(golden.params)]
+    told = {f"{declared_of(one).__name__}.{key}": value for (one, key), value in program.options.items()}
+    options = [f"{declared_of(one).__name__}.{key}" for one, key in options_of(golden.params)]
     return {
         "detent": __version__, "name": golden.unit.name, "axis": axis.name, "motor": golden.unit.motor,
         "method": axis.method.name, "arithmetic": golden.unit.arithmetic, "job": job,
