@@ -1070,7 +1070,7 @@ def described(file: Path) -> dict[str, dict]:
     return by_symbol
 
 
-@pytest.mark.parametrize("method", ["cascade", "phase_servo", "rotary_table"])
+@pytest.mark.parametrize("method", ["cascade", "single", "phase_servo", "rotary_table"])
 def test_32_another_reader_finds_every_parameter_and_register_in_the_description(exported, tmp_path, method):
     place, name = copied(exported(method), tmp_path / "out")
     found = described(place / f"{name}.a2l")
