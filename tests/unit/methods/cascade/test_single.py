@@ -26,6 +26,7 @@ from detent.methods.cascade.wired import wired
 from detent.methods.load import load_spec
 from detent.methods.moves.job import one_move
 from detent.methods.registry import METHODS
+from detent.operate.faults import injection_of
 from detent.operate.host import Host
 from detent.planning.profile import MotionLimits, plan_move
 from detent.tune.batch import run_chunk
@@ -159,6 +160,26 @@ def test_it_is_led_live():
     assert places[1] == pytest.approx(places[0], abs=2e-6)
     assert integrals[1] == pytest.approx(integrals[0], rel=1e-3)
     assert integrals[1] != integrals[0]
+
+
+@pytest.mark.compiled
+def test_a_fault_that_is_injected_has_the_code_that_it_has_in_double():
+    codes = []
+    for changes in ((), SINGLE):
+        found = {}
+        for text in ("drive wrong", "drive garbage", "encoder stuck", "load blocked"):
+            host = operated(*changes)
+            host.ask(MOVE_BY, 0.2)
+            host.run(300)
+            host.ask(*injection_of(host.axis.places, text))
+            for _ in range(2000):
+                host.run(1)
+                if host.board.operation.fault:
+                    break
+            found[text] = host.board.operation.fault
+        codes.append(found)
+    assert codes[0] == codes[1]
+    assert 0 not in codes[0].values()
 
 
 def test_on_a_drive_and_leading_one_it_is_the_same():
