@@ -29,7 +29,7 @@ from detent.methods.print_head import controller as head
 from detent.methods.rotary_table import controller as table
 from detent.methods.stepper_envelope import controller as stepper
 from detent.translate.program import Program
-from tests.bare_units import ENTRIES, JOBS, MOTORS, bare_code, bare_header, bare_program
+from tests.bare_units import ENTRIES, JOBS, MOTORS, axis_named, bare_code, bare_header, bare_program
 
 PAINTED = 1024  # bytes of stack
 END = 0xFF  # behind the last record
@@ -70,6 +70,7 @@ HOOKS: dict[str, list[tuple[Any, str, str, Callable[..., Made]]]] = {
         (head, "decide", "decide", lambda _p, c, w: (c, w, ())),
     ],
 }
+HOOKS["single"] = HOOKS["cascade"]
 """Where a simulation comes by an entry: module, name there, entry, and of its arguments controller, lines and numbers.
 
 Without an entry the registers are noted for what is called next, of which only a block is at hand.
@@ -119,7 +120,7 @@ class Notebook:
 
 def simulated(method: str, ticks: int) -> tuple[bytes, bytes, list[bytes]]:
     """Parameters, records and signals of a job, with plain steps."""
-    axis = detent.load(detent.example(f"{method}.toml"))
+    axis = axis_named(method)
     unit = unit_of(axis, motor=MOTORS.get(method, ""))
     book = Notebook(method, unit)
     for one in HOOKS[method]:
@@ -275,7 +276,7 @@ def counted(method: str, ticks: int, names: tuple[str, ...], work: Path) -> dict
     subprocess.run(command, check=True, env=environment, cwd=Path(__file__).parents[1])
     parts = [notes.with_suffix(f".{k}").read_bytes() for k in range(2)]
     signals = [one.read_bytes() for one in sorted(work.glob("notes.signal*"))]
-    axis = detent.load(detent.example(f"{method}.toml"))
+    axis = axis_named(method)
     unit = unit_of(axis, motor=MOTORS.get(method, ""))
     params = unit.params.from_buffer_copy(parts[0])
     program = bare_program(method, unit, params)

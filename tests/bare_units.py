@@ -7,6 +7,7 @@ clocks that are skipped where nothing happens. Here stand the entries of the spe
 from collections.abc import Callable
 from typing import Any
 
+import detent
 from detent.control import table_positioner
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference, control_cascade, coulomb_part
 from detent.control.clocks import count_clock, count_sawtooth, integrate_strobe, next_period, sample_strobe
@@ -57,7 +58,7 @@ def law(p: CascadeLawParams, r: CascadeLaw, ref: CascadeReference, position: flo
     r.position_error = ref.position - position
     r.feed_forward = f.acceleration * ref.acceleration + f.viscous * ref.velocity + coulomb_part(f, ref.velocity)
     demand = p.cascade.position_gain * r.position_error + f.velocity * ref.velocity
-    control_cascade(p, r, demand, velocity, 1.0)
+    control_cascade(p, r, demand, velocity, 1)
 
 
 @step
@@ -145,14 +146,23 @@ def next_(p: stepper.StepperControllerParams, c: stepper.StepperController, up: 
 
 JOBS = {
     "cascade": "slide_moves.toml",
+    "single": "slide_moves.toml",
     "filtered_servo": "slide_moves.toml",
     "phase_servo": "moves.csv",
     "rotary_table": "index_sequence.toml",
     "zoom": "zoom_sequence.toml",
     "print_head": "letter.txt",
 }
-"""Packaged axes, and their jobs."""
+"""Packaged axes, one of them in single precision too, and their jobs."""
 MOTORS = {"zoom": "group_a"}
+
+
+def axis_named(unit: str) -> detent.Axis:
+    """The axis of a unit of `JOBS`."""
+    if unit == "single":
+        return detent.load(detent.example("cascade.toml")).replace({"controller.arithmetic": "single"})
+    return detent.load(detent.example(f"{unit}.toml"))
+
 
 ENTRIES: dict[str, dict[str, Callable[..., Any]]] = {
     "cascade": {"power_on": cascade_power_on, "refer": refer, "sample": sample},
@@ -178,6 +188,7 @@ ENTRIES: dict[str, dict[str, Callable[..., Any]]] = {
     },
 }  # fmt: skip
 """Of each method: entries by their names."""
+ENTRIES["single"] = ENTRIES["cascade"]
 
 
 def bare_program(method: str, unit: ControlUnit, params: Registers) -> Program:

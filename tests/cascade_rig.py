@@ -3,11 +3,13 @@
 import math
 import re
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
 
 from detent.kernel.loop import advance
+from detent.kernel.registers import Registers, single
 from detent.methods.cascade.system import Cascade, CascadeParams, along, driven, fill_clocks, switch_on
 from detent.planning.profile import Profile
 from detent.plant.stribeck import StribeckFriction
@@ -73,12 +75,26 @@ def make_params(*, coupled: bool = False, gap: float = 0.0) -> CascadeParams:
     return p
 
 
+def in_single(p: Registers) -> Any:
+    """The same parameters of an axis whose controller computes in single precision."""
+    made: Any = single(type(p))()
+    for leaf in p.leaves():
+        *blocks, last = leaf.path.split(".")
+        to, of = reduce(getattr, blocks, made), reduce(getattr, blocks, p)
+        value = getattr(of, last)
+        if leaf.length:
+            getattr(to, last)[:] = value[:]
+        else:
+            setattr(to, last, value)
+    return made
+
+
 class Rig:
     """The axis after power-on at a position [m]."""
 
     def __init__(self, p: CascadeParams, position: float = 0.0) -> None:
         self.p = p
-        self.r = Cascade()
+        self.r = single(Cascade)() if type(p) is single(CascadeParams) else Cascade()
         switch_on(p, self.r, position)
 
     @property
@@ -102,7 +118,7 @@ class Rig:
 
         `feed` is a `profile` to follow or a `command` per sample; without, the reference stands.
         """
-        leaves = {leaf.path: leaf for leaf in Cascade.leaves()}
+        leaves = {leaf.path: leaf for leaf in type(self.r).leaves()}
         chosen = [leaves[name] for name in names]
         picks = np.concatenate([np.arange(c.offset, c.offset + c.width.size) for c in chosen]).astype(np.int64)
         dtype: Any = np.dtype([(c.path, "<" + c.width.code) for c in chosen])

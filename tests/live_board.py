@@ -31,11 +31,14 @@ HARDWARE = f'hardware.id="serial {NAME}"'
 SAMPLE = 0.25e-3  # of the example [s]
 
 
+SINGLE = 'controller.arithmetic="single"'
+
+
 @cache
-def program() -> Path:
+def program(*overrides: str) -> Path:
     """The board of the example, compiled without a warning."""
     folder = Path(mkdtemp()) / "firmware"
-    made = export_firmware(load(FILE), folder, prefix="slide", ticks=10)
+    made = export_firmware(load(FILE, overrides), folder, prefix="slide", ticks=10)
     sources = ["slide.c", "slide_params.c", "slide_selftest.c", "slide_serial.c", "posix.c"]
     assert made.name == "slide"
     told = [*f"{CC} {FLAGS} {WARNINGS} -Werror -O2".split(), *sources, "-lm", "-o", "board"]
@@ -139,7 +142,8 @@ def ready_on(bench: Bench) -> None:
 @contextmanager
 def on_board(*overrides: str, **more: Any) -> Generator[tuple[Bench, Stepped]]:
     """The example led on its board, sample by sample."""
-    board = SimulatedBoard(program(), FILE, NAME)
+    precision = [SINGLE] if SINGLE in overrides else []
+    board = SimulatedBoard(program(*precision), FILE, NAME, precision)
     drive = Stepped(board, **more)
     try:
         bench = Bench("cascade", *(overrides or [HARDWARE]), driver=drive, period=SAMPLE)

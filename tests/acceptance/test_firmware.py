@@ -21,7 +21,7 @@ from pathlib import Path
 import pytest
 from tests import firmware_steps
 from tests.bare_calls import counted as counted_calls
-from tests.bare_units import JOBS, MOTORS, bare_code
+from tests.bare_units import JOBS, MOTORS, axis_named, bare_code
 from tests.docs.pages import blocks_of
 from tests.firmware_replay import replayed
 from tests.firmware_steps import REFUSED
@@ -66,7 +66,7 @@ def exported(tmp_path_factory):
 
     @cache
     def make(method: str, ticks: int = SHORT, drawn: tuple[int, int] = FEW) -> Path:
-        axis = detent.load(detent.example(f"{method}.toml"))
+        axis = axis_named(method)
         place = tmp_path_factory.mktemp("firmware") / "out"
         files, rounds = drawn
         job, motor = detent.example(JOBS[method]), MOTORS.get(method, "")
@@ -113,8 +113,9 @@ def run(command: str, place: Path, *words: str) -> subprocess.CompletedProcess[s
     return subprocess.run([*command.split(), *words], cwd=place, capture_output=True, text=True, check=False)
 
 
-def test_01_the_cascade_is_equal_here(exported):
-    proven(exported("cascade"), "host-gcc")
+@pytest.mark.parametrize("method", ["cascade", "single"])
+def test_01_the_cascade_is_equal_here(exported, method):
+    proven(exported(method), "host-gcc")
 
 
 @pytest.mark.wide
@@ -141,6 +142,12 @@ def test_01_06_07_19_each_is_equal_by_another_compiler_as_long(exported, method)
 @pytest.mark.parametrize("target", EMULATED)
 def test_02_03_04_the_cascade_is_equal_on_each_processor(exported, target):
     proven(exported("cascade"), target)
+
+
+def test_02_single_precision_is_equal_with_the_instructions_for_it(exported):
+    folder = exported("single")
+    proven(folder, "cortex-m4f", "rv32")
+    assert read_manifest(folder)["hash"] != read_manifest(exported("cascade"))["hash"]  # another law
 
 
 @pytest.mark.wide
@@ -184,10 +191,14 @@ def test_08_whole_numbers_are_equal_where_an_int_has_16_bits(exported, method):
     folder = exported(method, 6_000)
     data = (folder / "vectors/job.vec").read_bytes()
     manifest = read_manifest(folder)
-    first, ticks, told = cut(unit_named(manifest["method"], manifest["name"]), data, 1_999)
+    first, ticks, told = cut(unit_named(manifest["method"], manifest["name"], manifest["arithmetic"]), data, 1_999)
     assert (ticks, len(told)) == (1_000, 16)
     assert (len(first) < 0.9 * len(data), told != manifest["hash"]) == (True, True)
-    assert cut(unit_named(manifest["method"], manifest["name"]), data, 6_000) == (data, 6_000, manifest["hash"])
+    assert cut(unit_named(manifest["method"], manifest["name"], manifest["arithmetic"]), data, 6_000) == (
+        data,
+        6_000,
+        manifest["hash"],
+    )
     proven(folder, "avr")
 
 
@@ -235,7 +246,7 @@ def test_09_floats_are_refused_for_a_processor_whose_double_is_narrow(exported, 
 
 def recorded(method: str, ticks: int):
     """The packaged job of a method, with its control unit as a witness: its vectors, and the axis at the end."""
-    axis = detent.load(detent.example(f"{method}.toml"))
+    axis = axis_named(method)
     job = axis.load_job(detent.example(JOBS[method]))
     golden = record(unit_of(axis, motor=MOTORS.get(method, "")), axis, job, ticks)
     return golden, golden.vectors()
@@ -341,22 +352,27 @@ int NAME_replay(void)
 """
 
 
+def told_on_board(processor: str, place: Path, name: str, code: str, flags: str) -> str:
+    """What a program in the place of the replay says first, on an emulated processor."""
+    target = TARGETS[processor]
+    (place / "self.c").write_text(code)
+    (place / "board.ld").write_text(template("board.ld.in", **target.memory))
+    words = f"{target.compiler} {flags} -O2 -w {target.flags} -T board.ld -Wl,-e,Start self.c board.c"
+    vectors = f'-DVECTORS="{place / "vectors/job.vec"}"'
+    made = run(words, place, *sources_and_test(place, name), vectors, "-o", "job", *target.libraries.split())
+    assert made.returncode == 0, made.stderr
+    semihosting = "-nographic -monitor none -serial none -semihosting-config enable=on,target=native"
+    told = run(f"{target.emulator} {target.machine} {semihosting} -kernel job", place)
+    return (told.stdout + told.stderr).split()[0]
+
+
 def test_13_the_self_test_finds_fused_arithmetic_and_the_replay_differs(exported, tmp_path, monkeypatch):
     """GNU C of gcc fuses products and sums where a processor can."""
     needs("cortex-m7")
     place, name = copied(exported("cascade"), tmp_path / "out")
     assert "2 products and sums are fused" in (place / f"{name}.h").read_text()
-    target = TARGETS["cortex-m7"]
-    (place / "self.c").write_text(TOLD.replace("NAME", name))
-    (place / "board.ld").write_text(template("board.ld.in", **target.memory))
     for flags, wanted in ((FLAGS, "0"), ("-std=gnu99", "2")):
-        words = f"{target.compiler} {flags} -O2 -w {target.flags} -T board.ld -Wl,-e,Start self.c board.c"
-        vectors = f'-DVECTORS="{place / "vectors/job.vec"}"'
-        made = run(words, place, *sources_and_test(place, name), vectors, "-o", "job", *target.libraries.split())
-        assert made.returncode == 0, made.stderr
-        semihosting = "-nographic -monitor none -serial none -semihosting-config enable=on,target=native"
-        told = run(f"{target.emulator} {target.machine} {semihosting} -kernel job", place)
-        assert (told.stdout + told.stderr).split()[0] == wanted
+        assert told_on_board("cortex-m7", place, name, TOLD.replace("NAME", name), flags) == wanted
     monkeypatch.setattr("detent.export.verify.FLAGS", "-std=gnu99")
     (one,) = verify(exported("cascade"), ["cortex-m7"])
     assert not one.equal
@@ -393,7 +409,7 @@ def test_17_a_bit_of_the_vectors_flipped_is_found_wherever_it_is(exported, tmp_p
 
 
 @pytest.mark.parametrize("method", [
-    "cascade", "phase_servo", *(pytest.param(one, marks=pytest.mark.wide) for one in (
+    "cascade", "single", "phase_servo", *(pytest.param(one, marks=pytest.mark.wide) for one in (
         "filtered_servo", "rotary_table", "zoom", "print_head"))
 ])  # fmt: skip
 def test_20_rules_of_misra_are_kept_but_for_the_advisory_ones_of_the_list(exported, method):
@@ -458,13 +474,13 @@ def test_21_nothing_is_written_and_little_is_taken_from_a_library(exported, tmp_
 
 LANGUAGE = re.compile(
     r"_((floor_div|floor_mod|shift_left|shift_down|shift_right|abs|min|max|wrap|wrap_add|wrap_sub|wrap_mul)"
-    r"_(int|i\d+|f8)|\w+_of_(int|unsigned|[iu]\d+)|to_i64|floor|power_of_two|bits_of|claimed|check_params|selftest)$"
+    r"_(int|i\d+|f[48])|\w+_of_(int|unsigned|[iuf]\d+)|to_i64|floor|power_of_two|bits_of|claimed|check_params|selftest)$"
 )
 """What is no step: an operator of Python, and the two questions about a set of parameters and a build."""
 
 
 @pytest.mark.parametrize(
-    "method", ["cascade", "phase_servo", "zoom", pytest.param("print_head", marks=pytest.mark.wide)]
+    "method", ["cascade", "single", "phase_servo", "zoom", pytest.param("print_head", marks=pytest.mark.wide)]
 )
 def test_23_every_function_has_a_row_that_leads_to_its_step(exported, method):
     folder = exported(method)
@@ -581,10 +597,13 @@ def test_31_a_parameter_out_of_its_range_is_told_by_its_number(exported, tmp_pat
     assert (done.returncode, told) == (0, [row["name"] for row, _ in spoiled])
 
 
-def test_11_plain_steps_make_the_same_vectors_byte_for_byte(exported, tmp_path):
+@pytest.mark.parametrize("method", ["cascade", "single"])
+def test_11_plain_steps_make_the_same_vectors_byte_for_byte(exported, tmp_path, method):
+    arithmetic = "single" if method == "single" else "double"
     script = (
         "import pathlib, detent\nfrom detent.export.unit import unit_of\nfrom detent.export.vectors import record\n"
-        "axis = detent.load(detent.example('cascade.toml'))\n"
+        "axis = detent.load(detent.example('cascade.toml'))"
+        f".replace({{'controller.arithmetic': '{arithmetic}'}})\n"
         "golden = record(unit_of(axis), axis, axis.load_job(detent.example('slide_moves.toml')), "
         f"{SHORT})\npathlib.Path('plain.vec').write_bytes(golden.vectors())\n"
     )
@@ -593,7 +612,7 @@ def test_11_plain_steps_make_the_same_vectors_byte_for_byte(exported, tmp_path):
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-500:]
-    assert (tmp_path / "plain.vec").read_bytes() == (exported("cascade") / "vectors/job.vec").read_bytes()
+    assert (tmp_path / "plain.vec").read_bytes() == (exported(method) / "vectors/job.vec").read_bytes()
 
 
 def test_17_a_bit_of_the_random_vectors_flipped_is_found_wherever_it_is(exported, tmp_path):
@@ -657,6 +676,7 @@ BARS_27 = {
     "zoom": 80,
     "print_head": 4700,
 }  # of memory [byte]
+BARS_27["single"] = BARS_27["cascade"]
 DEEPEST_27 = {"print_head": 450}  # bytes of stack; of the others 260
 LATER = {"guard", "supervision", "watched", "look", "marks", "mark", "stop_at"}
 """What the figures of the specification do not count: protection, homing by an index, a stop to look at on the way."""
@@ -668,6 +688,7 @@ BARS_26 = {
     "rotary_table": (2600, 2900),
     "cascade": (1800, 2200),
 }  # bytes of flash on M4 and M0
+BARS_26["single"] = BARS_26["cascade"]
 WHOLE_26 = {
     "print_head": (7600, 9100),
     "filtered_servo": (4400, 4850),
@@ -676,6 +697,7 @@ WHOLE_26 = {
     "rotary_table": (4700, 5200),
     "cascade": (6100, 6600),
 }
+WHOLE_26["single"] = WHOLE_26["cascade"]
 """The same of what is exported today, with protection, homing, a hanging load, dead bands, noise on lines."""
 BARS_28 = {
     "cascade": {"sample": (6500, 16000)},
@@ -685,6 +707,7 @@ BARS_28 = {
     "rotary_table": {"interrupt": (2500, 6700)},
     "print_head": {"emitter": (750, 1800), "decide": (700, 1600), "fired": (300, 500)},
 }  # instructions of the longest call
+BARS_28["single"] = BARS_28["cascade"]
 CALLED_28 = {"phase_servo": 5_000, "zoom": 100_000, "print_head": WHOLE["print_head"]}
 """Ticks of the job in which calls are noted, with plain steps: a stepper is then at speed, and the letter printed."""
 TICKS_28 = {
@@ -695,6 +718,7 @@ TICKS_28 = {
     "rotary_table": (2500, 6700),
     "print_head": (750 + 700 + 300, 1800 + 1600 + 500),
 }  # instructions of the longest tick of what is exported
+TICKS_28["single"] = TICKS_28["cascade"]
 """A tick of the cascade is a sample. One of the filtered servo has ten clocks and what comes before them (2,839 and
 6,855 in the prototype), of a stepper a pause of no length and the step behind it, of the phase servo a look of the
 guard, which came later, of the print head an emitter, a column and a decision."""
@@ -755,7 +779,7 @@ def test_26_flash_of_the_units_as_the_specification_lists_them(exported, tmp_pat
     needs("cortex-m4")
     folder, place = exported(method), tmp_path
     manifest, target = read_manifest(folder), TARGETS[CORTEX[k]]
-    unit = unit_named(manifest["method"], manifest["name"])
+    unit = unit_named(manifest["method"], manifest["name"], manifest["arithmetic"])
     params = unit.params.from_buffer_copy((folder / "vectors/params.bin").read_bytes())
     (place / "bare.c").write_text(bare_code(method, unit, params))
     sizes = {}
@@ -790,6 +814,70 @@ def test_27_28_calls_as_the_specification_lists_them(tmp_path, method):
         for name, bars in BARS_28[method].items():
             assert 0.05 * bars[k] < found[target][name].most <= bars[k], (target, name)
         assert 40 <= max(one.stack for one in found[target].values()) <= DEEPEST_27.get(method, 260)
+
+
+MOST_SINGLE = 830
+"""The prototype's sample in single precision took 757 instructions of a Cortex-M4F at most, of 705 on average; and a
+tenth. It had positions in single precision, too; here they are doubles, up to the error."""
+
+
+@pytest.mark.wide
+def test_28_a_sample_in_single_precision_takes_a_fifth_of_the_instructions(tmp_path):
+    """Section 6, 4, on a Cortex-M4F."""
+    needs("cortex-m4f")
+    most = {}
+    for arithmetic in ("cascade", "single"):
+        (tmp_path / arithmetic).mkdir()
+        most[arithmetic] = counted_calls(arithmetic, LONG, ("cortex-m4f",), tmp_path / arithmetic)["cortex-m4f"]
+    single, double = (most[one]["sample"].most for one in ("single", "cascade"))
+    assert 0.5 * MOST_SINGLE < single <= MOST_SINGLE
+    assert 4.0 * single < double <= BARS_28["cascade"]["sample"][0]
+
+
+def test_06_single_precision_is_never_promoted(exported, tmp_path):
+    """Where it meets double, a cast says so; of the law nothing does. A literal without its f is found."""
+    needs("cortex-m4f")
+    place, name = copied(exported("single"), tmp_path / "out")
+    assert read_manifest(place)["single to double"] == []
+    code = (place / f"{name}.c").read_text()
+    laws = re.findall(r"/\* detent/control/(?:cascade_law|guard|supervision)\.py.*?\n}\n", code, re.DOTALL)
+    assert len(laws) > 20
+    bodies = [law.partition("\n{\n")[2] for law in laws if " feed_forward\n" not in law]
+    assert [body for body in bodies if "double" in body] == []
+    strict = f"arm-none-eabi-gcc {FLAGS} {PROCESSORS['cortex-m4f']} {WARNINGS} -Werror -c {name}.c -o unit.o"
+    assert run(strict, place).stderr == ""
+    assert code.count("2.0f * p->limits.following_error") == 1
+    (place / f"{name}.c").write_text(code.replace("2.0f * p->limits", "2.0 * p->limits"))
+    assert "-Werror=double-promotion" in run(strict, place).stderr
+
+
+FLUSHED = """    uint32_t mode;
+    __asm volatile("vmrs %0, fpscr" : "=r"(mode));
+    __asm volatile("vmsr fpscr, %0" : : "r"(mode | (1u << 24)));
+"""
+
+
+def test_13_the_self_test_finds_fused_and_flushed_single_precision(exported, tmp_path):
+    """Of a processor that computes singles by itself, and doubles by a library, which does neither."""
+    needs("cortex-m4f")
+    place, name = copied(exported("single"), tmp_path / "out")
+    assert "7 float is not IEEE binary32" in (place / f"{name}.h").read_text()
+    told = TOLD.replace("NAME", name)
+    assert told_on_board("cortex-m4f", place, name, told, FLAGS) == "0"
+    assert told_on_board("cortex-m4f", place, name, told, "-std=gnu99") == "2"
+    flushed = told.replace(f"    {name}_put", f"{FLUSHED}    {name}_put", 1)
+    assert told_on_board("cortex-m4f", place, name, flushed, FLAGS) == "3"
+
+
+def test_32_registers_of_single_precision_are_described_as_such(exported, tmp_path):
+    place, name = copied(exported("single"), tmp_path / "out")
+    widths = {row["name"]: row["width"] for row in rows(place / "registers.csv")}
+    assert widths["controller.law.integral"] == "f4"
+    assert widths["controller.reference.position"] == widths["controller.motor_sensor.position"] == "f8"
+    text = (place / f"{name}.a2l").read_text()
+    found = re.search(rf"/begin MEASUREMENT {name}.controller.law.integral .*?/end MEASUREMENT", text, re.DOTALL)
+    assert "FLOAT32_IEEE" in found[0]
+    assert "-3.4028234663852886e+38 3.4028234663852886e+38" in found[0]
 
 
 @pytest.mark.wide
@@ -830,7 +918,7 @@ def test_27_arrays_are_as_long_as_the_axis_uses_them(exported, method):
     folder = exported(method)
     manifest = read_manifest(folder)
     unit, _ = exported_unit(folder, manifest)
-    declared = unit_named(manifest["method"], manifest["name"])
+    declared = unit_named(manifest["method"], manifest["name"], manifest["arithmetic"])
     shorter = {now.path: now.length for was, now in zip(declared.leaves, unit.leaves, strict=True)
                if now.length != was.length}  # fmt: skip
     assert shorter == LENGTHS.get(method, {})
@@ -982,7 +1070,7 @@ def described(file: Path) -> dict[str, dict]:
     return by_symbol
 
 
-@pytest.mark.parametrize("method", ["cascade", "phase_servo", "rotary_table"])
+@pytest.mark.parametrize("method", ["cascade", "single", "phase_servo", "rotary_table"])
 def test_32_another_reader_finds_every_parameter_and_register_in_the_description(exported, tmp_path, method):
     place, name = copied(exported(method), tmp_path / "out")
     found = described(place / f"{name}.a2l")
@@ -1038,7 +1126,7 @@ def test_34_a_serial_line_alone_carries_the_proof_and_8_kb_suffice(exported, tmp
     needs("cortex-m4")
     folder = exported(method)
     manifest, target = read_manifest(folder), TARGETS["cortex-m4"]
-    name, unit = manifest["name"], unit_named(manifest["method"], manifest["name"])
+    name, unit = manifest["name"], unit_named(manifest["method"], manifest["name"], manifest["arithmetic"])
     beside = ctypes.sizeof(unit.controller) + ctypes.sizeof(unit.lines) + 8192
     (tmp_path / "board.ld").write_text(template("board.ld.in", **(target.memory | {"data_length": str(beside)})))
     made = run(
@@ -1095,9 +1183,10 @@ def test_18_a_step_edited_after_the_export_is_named(tmp_path):
     assert read_manifest(folder)["report"] == {}
 
 
-def test_31_a_set_exchanged_at_tick_10000_is_simulated_and_replayed_equal(tmp_path):
+@pytest.mark.parametrize("method", ["cascade", pytest.param("single", marks=pytest.mark.wide)])
+def test_31_a_set_exchanged_at_tick_10000_is_simulated_and_replayed_equal(tmp_path, method):
     needs("host-gcc")
-    axis = detent.load(detent.example("cascade.toml"))
+    axis = axis_named(method)
     rows_of = '[[move]]\nby = "300 mm"\ndwell = "{dwell}"\n'
     change = '[[parameter_change]]\ntime = "{time!r} s"\nname = "{name}"\nvalue = {value}\n'
     (tmp_path / "same.toml").write_text(rows_of.format(dwell="2 s"))
@@ -1140,7 +1229,7 @@ CHANGED = {
 @pytest.mark.parametrize("method", CHANGED)
 def test_31_a_set_is_exchanged_in_a_job_of_each_method(tmp_path, method):
     needs("host-gcc")
-    axis, motor = detent.load(detent.example(f"{method}.toml")), MOTORS.get(method, "")
+    axis, motor = axis_named(method), MOTORS.get(method, "")
     text, name, value = CHANGED[method]
     (tmp_path / "line.txt").write_text("a line")
     told = f"{motor}.{name}" if motor else name

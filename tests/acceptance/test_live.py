@@ -3215,9 +3215,10 @@ def test_21_the_first_motion_is_held_to_a_tenth_of_the_speed(name: str) -> None:
 @live_board.needs_cc
 @pytest.mark.wide
 @pytest.mark.process
-def test_31_a_board_is_led_over_a_serial_line_as_a_drive_is():
+@pytest.mark.parametrize("overrides", [(), (live_board.HARDWARE, live_board.SINGLE)], ids=["double", "single"])
+def test_31_a_board_is_led_over_a_serial_line_as_a_drive_is(overrides):
     """Jog, stop and homing on the exported controller; what is commanded is where the machine goes."""
-    with live_board.on_board() as (bench, drive):
+    with live_board.on_board(*overrides) as (bench, drive):
         facts = {fact.name: fact.value for fact in bench.host.link.facts}
         assert "as the axis file gives it" in facts["firmware"]
         bench.pass_time(0.02)

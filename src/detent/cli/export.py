@@ -13,7 +13,7 @@ from detent.errors import DetentError
 OUTPUT = "Folder for the export: a new one, an empty one, or that of an earlier export."
 MOTOR = "Which motor, of a file that has several."
 PREFIX = "Prefix of all names in C. Default: from the name of the motor or the axis."
-TARGET = "What it is for: host, cortex-m0, cortex-m4, cortex-m7, rv32 or avr. The C is the same for all."
+TARGET = "What it is for: host, cortex-m0, cortex-m4, cortex-m4f, cortex-m7, rv32 or avr. The C is the same for all."
 TICKS = "Ticks of the golden run at most."
 FILES = "Random register files that each function is called on."
 ROUNDS = "Ticks in which the host does anything and the lines show anything."
@@ -22,7 +22,7 @@ FIXED = "Parameters that become constants of the code, comma-separated, * for an
 CLOCK = "Clock of a processor, for the share of a tick that the controller takes: 72MHz."
 PRINT = "Show a file of vectors as text: vectors/job.vec, vectors/drawn.vec. Nothing is compiled."
 ON = (
-    "Where to replay, comma-separated: host-gcc, host-clang, cortex-m0, cortex-m4, cortex-m7, rv32, avr. "
+    "Where to replay, comma-separated: host-gcc, host-clang, cortex-m0, cortex-m4, cortex-m4f, cortex-m7, rv32, avr. "
     "Default: all there."
 )
 MUTANTS = "Change one thing of the C at so many places, one at a time, and tell which changes no vector finds."

@@ -12,7 +12,7 @@ counted right does so ever after. Such a force is no fault by itself: what comes
 command at its limit, a speed, a following error.
 """
 
-from detent.kernel.registers import Registers, block, f8, i1, i4, i8, register, u1
+from detent.kernel.registers import Registers, block, i1, i4, i8, real, register, u1
 from detent.kernel.step import hot_step, step
 
 STUCK, JUMPED, REVERSED = 2, 3, 4
@@ -75,12 +75,12 @@ class Guard(Registers):
 class Weighing(Registers):
     """What the effort makes of a motion against it: of a controller that weighs its effort."""
 
-    effort: f8 = register("effort since the last sample", unit="V")
+    effort: real = register("effort since the last sample", unit="V")
     moved: i8 = register("movement up to the last sample", unit="count")
     against: i4 = register("samples of motion against the effort", unit="count")
     first: i8 = register("speed against it in the sample before them", unit="count")
-    efforts: f8 = register("sum of the effort over them", unit="V")
-    answer: f8 = register("sum of the effort times what the speed against it grew by", unit="V.count")
+    efforts: real = register("sum of the effort over them", unit="V")
+    answer: real = register("sum of the effort times what the speed against it grew by", unit="V.count")
 
 
 @step

@@ -5,7 +5,7 @@ axis has not got is not watched: its parameter is 0.
 """
 
 from detent.control.guard import Guard, GuardParams, lasting, trip
-from detent.kernel.registers import Registers, f8, i1, i4, register, u1
+from detent.kernel.registers import Registers, i1, i4, real, register, u1
 from detent.kernel.step import step
 
 LINK_LOST, DISAGREE, SWINGS, TOO_HOT, ON_SWITCH, OPEN_WIRE = 1, 5, 14, 21, 30, 33
@@ -18,11 +18,11 @@ class SupervisionParams(Registers):
     """What there is to watch."""
 
     link: i4 = register("samples within which a second word that is none is a fault; 0: no checks", unit="count")
-    slip: f8 = register("largest difference between both encoders; 0: there is one, or any", unit="m")
+    slip: real = register("largest difference between both encoders; 0: there is one, or any", unit="m")
     switches: u1 = register("1 where limit switches are wired")
-    bears: f8 = register("command that the motor bears for ever; 0: there is no model of its heat", unit="V")
-    warming: f8 = register("part of a new load that its heat takes over at a sample", unit="1")
-    swing: f8 = register("error to either side, in turn, that counts as a half swing; 0: any", unit="m")
+    bears: real = register("command that the motor bears for ever; 0: there is no model of its heat", unit="V")
+    warming: real = register("part of a new load that its heat takes over at a sample", unit="1")
+    swing: real = register("error to either side, in turn, that counts as a half swing; 0: any", unit="m")
     slowest: i4 = register("samples that one may take", unit="count")
 
 
@@ -32,7 +32,7 @@ class Supervision(Registers):
     left: i4 = register("samples in which another word that is none is a fault", unit="count")
     apart: i4 = register("samples in a row with encoders that disagree", unit="count")
     side: i1 = register("end on whose limit switch the axis is: -1 lower, 1 upper, 0 none", unit="code")
-    heat: f8 = register("load of the motor, squared and smoothed, over what it bears for ever", unit="1")
+    heat: real = register("load of the motor, squared and smoothed, over what it bears for ever", unit="1")
     sense: i1 = register("side of the last half swing", unit="code")
     age: i4 = register("samples since it began", unit="count")
     swings: i4 = register("half swings in a row", unit="count")

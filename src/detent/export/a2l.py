@@ -11,9 +11,10 @@ from detent.export.code import template
 
 Row = Mapping[str, Any]
 BYTE_ORDERS = {True: "MSB_LAST", False: "MSB_FIRST"}  # by whether the least byte comes first
+LARGEST_SINGLE = float.fromhex("0x1.fffffep127")
 _TYPES = {
     "u1": "UBYTE", "u2": "UWORD", "u4": "ULONG", "i1": "SBYTE", "i2": "SWORD", "i4": "SLONG", "i8": "A_INT64",
-    "f8": "FLOAT64_IEEE",
+    "f4": "FLOAT32_IEEE", "f8": "FLOAT64_IEEE",
 }  # fmt: skip
 
 
@@ -61,7 +62,9 @@ def a2l_text(  # noqa: PLR0913 - what the tables hold, and what a linked program
 
 def _ends(width: str) -> tuple[str, str]:
     """What a width can hold."""
-    if width[0] == "f":
+    if width == "f4":
+        return repr(-LARGEST_SINGLE), repr(LARGEST_SINGLE)
+    if width == "f8":
         return repr(-sys.float_info.max), repr(sys.float_info.max)
     bits = 8 * int(width[1:])
     return ("0", str((1 << bits) - 1)) if width[0] == "u" else (str(-(1 << bits - 1)), str((1 << bits - 1) - 1))

@@ -20,11 +20,12 @@ from detent.export.vectors import Golden
 from detent.kernel.registers import Field, Leaf, Registers, Width
 from detent.translate.program import Function, Program
 from detent.translate.text import FLASH_INCLUDE, code_text, comment_of, signals_text, struct_texts
-from detent.translate.values import Value, c_field, interval_of, number, type_of_local, unsigned
+from detent.translate.values import Value, as_single_number, c_field, interval_of, number, type_of_local, unsigned
 
 FLAGS = "-std=c99 -ffp-contract=off"
 PROCESSORS = {
     "host": "", "cortex-m0": "-mthumb -mcpu=cortex-m0", "cortex-m4": "-mthumb -mcpu=cortex-m4",
+    "cortex-m4f": "-mthumb -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard",
     "cortex-m7": "-mthumb -mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard", "rv32": "-march=rv32imac -mabi=ilp32",
     "avr": "-mmcu=atmega2560",
 }  # fmt: skip
@@ -80,7 +81,7 @@ def in_c(unit: ControlUnit, leaf: Leaf, controller: str, lines: str) -> InC:
     """A leaf as C sees it."""
     place = place_of(leaf.path, controller, lines) + ("[k]" if leaf.length else "")
     unsigned = f"uint{8 * leaf.width.size}_t"
-    bits = f"{unit.name}_bits({place})" if leaf.width.is_float else f"(uint64_t)({unsigned}){place}"
+    bits = f"{unit.name}_bits_{leaf.width.code}({place})" if leaf.width.is_float else f"(uint64_t)({unsigned}){place}"
     return InC(place, bits, leaf.width.c_name, unsigned, leaf.width.size, leaf.length, leaf.width.is_float)
 
 
@@ -213,7 +214,7 @@ def range_checks(program: Program, params: Registers) -> Iterator[dict[str, Any]
             continue
         place, (lo, hi) = row.expression + ("[k]" if row.length else ""), field.range
         least, most = (-math.inf, math.inf) if width.is_float else interval_of(width)
-        ends = [number(lo), number(hi)]
+        ends = [as_single_number(lo), as_single_number(hi)] if width.code == "f4" else [number(lo), number(hi)]
         if not width.is_float and not width.is_signed:
             ends = [unsigned(one) for one in ends]
         parts = [f"({place} >= {ends[0].text})"] if lo > least else []
@@ -234,7 +235,7 @@ def texts(  # noqa: PLR0913 - what the files tell of
         for kind, large in (("image", False), ("large", True))
     }
     code = code_text(program)
-    floats = any(leaf.float for leaf in leaves)
+    floats = sorted({leaf.ctype for leaf in leaves if leaf.float})
     signals = [
         {"code": value.width.code, "ctype": value.width.c_name, "bytes": value.width.size, "most": golden.signals[k][0]}
         for k, value in enumerate(signals_of(unit, program))
@@ -352,8 +353,8 @@ def _call_in_c(chance: Chance, f: Function) -> list[str]:
         elif value.kind == "bool":
             lines.append(f"const bool a{k} = (draw() & 1) == 1;")
         elif value.kind == "float":
-            lines.append(f"const double a{k} = draw_real({-FAR}, {FAR}, 0.0);")
-            told.append(f"real_bits(a{k})")
+            lines.append(f"const {value.ctype} a{k} = ({value.ctype})draw_real({-FAR}, {FAR}, 0.0);")
+            told.append(f"real_bits((double)a{k})")
         else:
             lo, hi = drawn_from(value.lo, value.hi)
             least, most, count = (number(one).text for one in (lo, hi, hi - lo + 1))
@@ -362,7 +363,7 @@ def _call_in_c(chance: Chance, f: Function) -> list[str]:
             told.append(f"(uint64_t)a{k}")
     lines += [f"told_[{k}] = {one};" for k, one in enumerate(told)] + [f"arguments_ = {len(told)};"]
     call = f"{f.cname}({', '.join(f'a{k}' for k in range(len(program.arguments(f))))})"
-    forms = {"int": "return (uint64_t){};", "bool": "return {} ? 1u : 0u;", "float": "return real_bits({});"}
+    forms = {"int": "return (uint64_t){};", "bool": "return {} ? 1u : 0u;", "float": "return real_bits((double){});"}
     return [*lines, *forms.get(f.result_kind, "(void){};\nreturn 0;").format(call).splitlines()]
 
 

@@ -35,6 +35,7 @@ from detent.kernel.draws import Draws, Ends, Places, add_image, draw, draw_into,
 from detent.kernel.image import WHOLE, add_bytes, begin_hash
 from detent.kernel.loop import HostArray
 from detent.kernel.registers import PLANT, Registers, Width
+from detent.kernel.single import Single
 from detent.translate.program import Function, Program
 from detent.translate.values import Shape, Value, interval_of
 
@@ -45,7 +46,7 @@ FILES, ROUNDS = 1000, 1_000_000  # register files of each function, and ticks of
 PLACES = 16  # entries of a signal at most
 FAR = float(1 << 13)  # magnitude of the largest float without a range
 WIDE = 1 << 30  # magnitude of the largest integer of 64 bits
-NO_NUMBER = 0x7FF8 << 48  # bits of what is none, whatever a processor makes of it
+NO_NUMBERS = {"f8": 0x7FF8 << 48, "f4": 0x7FC0 << 16}  # bits of what is none, whatever a processor makes of it
 SEED = 1
 ROOTS = ("p", "c", "l")
 AS_DECLARED = Shape()  # lengths and ranges are those of the declarations
@@ -110,9 +111,10 @@ def arrays(rows: Sequence[Row]) -> tuple[Places, Ends]:
     return np.array(places, np.int64).reshape(-1, 7), np.array(ends, np.float64).reshape(-1, 3)
 
 
-def _float_places(rows: Sequence[Row]) -> NDArray[np.int64]:
-    """Where floats stand, counted in floats."""
-    found = [row.offset // 8 + k for row in rows if row.width.is_float for k in range(max(row.length, 1))]
+def _float_places(rows: Sequence[Row], code: str) -> NDArray[np.int64]:
+    """Where floats of a width stand, counted in such floats."""
+    of_width = [row for row in rows if row.width.code == code]
+    found = [row.offset // row.width.size + k for row in of_width for k in range(max(row.length, 1))]
     return np.array(found, np.int64)
 
 
@@ -145,9 +147,11 @@ class Chance:
         self.signals = [value for value in tick.names.values() if value is not None and value.kind == "signal"]
         self._picks = {(root, large): self._bytes_of(root, large) for root in ("c", "l") for large in (False, True)}
         self._floats = [
-            (np.frombuffer(self.files[root], np.float64, ctypes.sizeof(self.files[root]) // 8), _float_places(rows))
+            (np.frombuffer(self.files[root], code, ctypes.sizeof(self.files[root]) // int(code[1])), places)
             for root, rows in self.rows.items()
-            if root != "p" and any(row.width.is_float for row in rows)
+            for code in NO_NUMBERS
+            for places in [_float_places(rows, code)]
+            if root != "p" and len(places)
         ]
         self.d, self.h = Draws(), begin_hash()
         self.told: list[Any] = []  # arguments of the last call
@@ -186,7 +190,8 @@ class Chance:
         if value.kind == "bool":
             return draw(self.d) & 1 == 1
         if value.kind == "float":
-            return draw_real(self.d, -FAR, FAR, 0.0)
+            drawn = draw_real(self.d, -FAR, FAR, 0.0)
+            return Single(drawn) if value.is_single else drawn
         lo, hi = drawn_from(value.lo, value.hi)
         return draw_whole(self.d, lo, hi, hi - lo + 1)
 
@@ -210,15 +215,15 @@ class Chance:
         if result is None or isinstance(result, Registers):
             return 0
         if isinstance(result, float):
-            return NO_NUMBER if math.isnan(result) else bits_of(result)
+            return NO_NUMBERS["f8"] if math.isnan(result) else bits_of(float(result))
         return int(result)
 
     def tidy(self) -> None:
         """Give every register that is no number the same bits: processors differ in those."""
         for floats, places in self._floats:
             if np.isnan(floats[places]).any():
-                bits, those = floats.view(np.int64), places[np.isnan(floats[places])]
-                bits[those] = NO_NUMBER
+                bits, those = floats.view(f"i{floats.itemsize}"), places[np.isnan(floats[places])]
+                bits[those] = NO_NUMBERS[f"f{floats.itemsize}"]
 
     def calls(self, number: int, most: int) -> Iterator[int]:
         """Call a function again and again; after each call the hash."""

@@ -226,6 +226,10 @@ def report_lines(folder: str | Path, measured: Sequence[Measured], clock: str = 
     loops = sorted({loop for one in manifest["entries"].values() for loop in one["loops"]})
     yield f"loops: {len(loops) or 'none'}"
     yield from (f"  {loop}" for loop in loops)
+    if manifest.get("arithmetic") == "single":
+        rows = manifest["single to double"]
+        yield f"single precision that meets double: {len(rows) or 'nowhere'}"
+        yield from (f"  {row}" for row in rows)
     for what, rows in manifest["not proven"].items():
         yield f"not proven: {len(rows)} {what}"
         yield from (f"  {row}" for row in rows)

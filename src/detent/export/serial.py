@@ -17,6 +17,7 @@ def serial_texts(axis: Any, unit: ControlUnit, about: str) -> dict[str, str]:
         return {}
     board: Board = method.brought(method.boards)
     given: dict[str, Any] = {"name": unit.name, "NAME": unit.name.upper(), "about": about, **board.values(axis.spec)}
+    given["real"] = "float" if unit.arithmetic == "single" else "double"
     told = [leaf for leaf in board.lines.leaves() if leaf.by == CONTROLLER]
     given |= {
         "mailbox": [_get(leaf, board.places[leaf.path]) for leaf in told],

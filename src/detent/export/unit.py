@@ -15,13 +15,32 @@ from typing import Any, cast, get_args
 from detent.axis import Axis
 from detent.errors import DetentError
 from detent.kernel.loop import control_of
-from detent.kernel.registers import Field, Fit, Leaf, Registers, Width, f8, i1, i2, i4, i8, u1, u2, u4
+from detent.kernel.registers import (
+    Field,
+    Fit,
+    Leaf,
+    Registers,
+    Width,
+    declared_of,
+    f4,
+    f8,
+    i1,
+    i2,
+    i4,
+    i8,
+    single,
+    u1,
+    u2,
+    u4,
+)
 from detent.methods.registry import METHODS
 from detent.translate.program import Program, blocks_of
 from detent.translate.values import C_WORDS, RefusedError, Shape, Table
 
 NARROW = ("avr",)  # targets whose double is not IEEE binary64
-WIDTHS: dict[str, Width] = {one.code: one for one in (get_args(hint)[1] for hint in (u1, u2, u4, i1, i2, i4, i8, f8))}
+WIDTHS: dict[str, Width] = {
+    one.code: one for one in (get_args(hint)[1] for hint in (u1, u2, u4, i1, i2, i4, i8, f4, f8))
+}
 """What an argument of a call can be."""
 AS_DECLARED = Fit()
 LARGE = 64  # elements of an array that enters the hash of every 1000th tick only if it has more
@@ -39,6 +58,8 @@ class ControlUnit:
     motor: str = ""  # which of several motors of the axis it moves
     fits: Callable[[Any], Fit] | None = None  # how much of its arrays some parameters use
     fit: Fit = AS_DECLARED  # how much of them it has
+    axis: type[Registers] = Registers  # state of the axis of which it is a part
+    arithmetic: str = "double"  # or "single"
 
     @cached_property
     def shape(self) -> Shape:
@@ -133,7 +154,7 @@ def places_of(registers: type[Registers]) -> Iterator[tuple[type[Registers], Fie
 
 def arguments(step: Callable[..., Any], roots: Mapping[type[Registers], str]) -> Iterator[str]:
     """What a step takes: registers by the names of `roots`, a signal laid ready as "signal", numbers by their width."""
-    plain = getattr(step, "py_func", step)
+    plain, roots = getattr(step, "py_func", step), {declared_of(one): name for one, name in roots.items()}
     for name, hint in inspect.get_annotations(plain, eval_str=True).items():
         width = next((one for one in get_args(hint)[1:] if isinstance(one, Width)), None)
         if name == "return":
@@ -227,12 +248,13 @@ def members(registers: Registers) -> Iterator[tuple[Field, Any]]:
 
 
 def refuse_floats(unit: ControlUnit, target: str) -> None:
-    """Refuse a unit with floats for a processor whose `double` has 32 bits (FW05)."""
+    """Refuse a unit with floats for a processor whose `double` has 32 bits (FW05): single ones meet double ones."""
     roots = {"params": unit.params, "controller": unit.controller, "lines": unit.lines}
     for root, registers in roots.items() if target in NARROW else ():
         for leaf in registers.leaves():
             if leaf.width.is_float:
-                got = f"{root}.{leaf.path}, a number of 64 bits, for {target}, whose double has 32"
+                bits = 8 * leaf.width.size
+                got = f"{root}.{leaf.path}, a number of {bits} bits, for {target}, whose double has 32"
                 expected = "a controller of whole numbers"
                 raise RefusedError("FW05", None, got, expected, "a variant in whole numbers, or another --target")
 
@@ -268,23 +290,25 @@ def unit_of(axis: Axis, prefix: str = "", motor: str = "") -> ControlUnit:
     name = name if prefix or not name[0].isdigit() else f"axis_{name}"
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or name in C_WORDS:
         raise RefusedError("FW13", None, f"the prefix {name!r}", "a name in C", "name another with --prefix")
-    return _unit(method, name, motor)
+    return _unit(method, name, motor, method.arithmetic(axis.spec))
 
 
-def unit_named(method: str, name: str) -> ControlUnit | None:
+def unit_named(method: str, name: str, arithmetic: str = "double") -> ControlUnit | None:
     """The control unit of a method with this prefix; None where the method is not there, or has none."""
     found = METHODS.get(method)
-    return _unit(found, name) if found is not None and found.actions else None
+    return _unit(found, name, arithmetic=arithmetic) if found is not None and found.actions else None
 
 
-def _unit(method: Any, name: str, motor: str = "") -> ControlUnit:
-    params = method.parameters().__fields__["controller"].block
-    state = method.registers().__fields__
+def _unit(method: Any, name: str, motor: str = "", arithmetic: str = "double") -> ControlUnit:
+    kinds = [method.parameters(), method.registers()]
+    whole, axis = map(single, kinds) if arithmetic == "single" else kinds
+    params, state = whole.__fields__["controller"].block, axis.__fields__
     controller, lines = state["controller"].block, state["lines"].block
     if params is None or controller is None or lines is None:
         raise DetentError(f"the method {method.name} has no controller of its own; name another axis")
     steps = {f"{name}_control": control_of(params)}
     steps |= {f"{name}_{one}": method.brought(f"controller:{one}") for one in (*method.actions, *method.interrupts)}
     return ControlUnit(
-        name, params, controller, lines, steps, motor, method.brought(method.fits) if method.fits else None
-    )
+        name, params, controller, lines, steps, motor, method.brought(method.fits) if method.fits else None,
+        axis=axis, arithmetic=arithmetic,
+    )  # fmt: skip

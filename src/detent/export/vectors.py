@@ -38,7 +38,7 @@ from detent.translate.values import RefusedError
 MAGIC, VERSION = b"DTNV", 2
 END, WRITE, TICKS, CHECK, SIGNAL, CALL, EXCHANGE = range(7)
 FORMATS = {
-    "u1": "B", "u2": "H", "u4": "I", "i1": "b", "i2": "h", "i4": "i", "i8": "q", "f8": "d",
+    "u1": "B", "u2": "H", "u4": "I", "i1": "b", "i2": "h", "i4": "i", "i8": "q", "f4": "f", "f8": "d",
 }  # fmt: skip
 """Formats of `struct` for the widths of arguments."""
 STRETCH = 1000  # ticks from check to check
@@ -277,7 +277,7 @@ def _size(leaf: Leaf) -> int:
 
 def record(unit: ControlUnit, axis: Any, job: Any, most: int) -> Golden:
     """Do a job, and make its vectors, of `most` ticks at most."""
-    golden = Golden(unit, axis.method.registers(), most, changes_of(job, unit.motor))
+    golden = Golden(unit, unit.axis, most, changes_of(job, unit.motor))
     with suppress(EnoughError):
         axis.simulated.run(job, recorder=golden)
     return golden

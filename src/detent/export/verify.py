@@ -89,6 +89,7 @@ TARGETS = {
         _host("host-clang", "clang"),
         _cortex("cortex-m0", "mps2-an385"),
         _cortex("cortex-m4", "mps2-an386"),
+        _cortex("cortex-m4f", "mps2-an386"),
         _cortex("cortex-m7", "mps2-an500", "0x60000000"),
         Target(
             "rv32", "riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf",
@@ -167,7 +168,7 @@ def absent(why: str) -> str:
 def left_out(folder: str | Path) -> dict[str, str]:
     """Targets on which an export cannot be replayed, and why."""
     manifest, found = manifest_of(Path(folder)), dict[str, str]()
-    unit = unit_named(manifest["method"], manifest["name"])
+    unit = unit_named(manifest["method"], manifest["name"], manifest.get("arithmetic", "double"))
     for name, target in TARGETS.items():
         try:
             if unit is not None:
@@ -288,7 +289,7 @@ def told_of(folder: Path, lines: Sequence[str]) -> str:
 
 def exported_unit(folder: Path, manifest: Mapping[str, Any]) -> tuple[ControlUnit, Registers] | None:
     """The unit of an export, and its parameters at power-on; None where its registers are others by now."""
-    unit = unit_named(manifest["method"], manifest["name"])
+    unit = unit_named(manifest["method"], manifest["name"], manifest.get("arithmetic", "double"))
     data = (folder / "vectors/params.bin").read_bytes()
     if unit is None or "fit" not in manifest or len(data) != ctypes.sizeof(unit.params):
         return None

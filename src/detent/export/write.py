@@ -29,6 +29,7 @@ from detent.export.serial import serial_texts
 from detent.export.unit import ControlUnit, options_of, outside_ranges, refuse_floats, unit_of
 from detent.export.vectors import FORMATS, Golden, record
 from detent.files.text import write_errors
+from detent.kernel.registers import declared_of
 from detent.methods.check import check_spec
 from detent.translate.program import Function, Program
 from detent.translate.values import RefusedError
@@ -148,11 +149,11 @@ def export_firmware(  # noqa: PLR0913 - what to export, where to, and what may b
 
 def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[str, Any]:
     """What an export was made from, and what is not proven of it."""
-    told = {f"{one.__name__}.{key}": value for (one, key), value in program.options.items()}
-    options = [f"{one.__name__}.{key}" for one, key in options_of(golden.params)]
+    told = {f"{declared_of(one).__name__}.{key}": value for (one, key), value in program.options.items()}
+    options = [f"{declared_of(one).__name__}.{key}" for one, key in options_of(golden.params)]
     return {
         "detent": __version__, "name": golden.unit.name, "axis": axis.name, "motor": golden.unit.motor,
-        "method": axis.method.name, "job": job,
+        "method": axis.method.name, "arithmetic": golden.unit.arithmetic, "job": job,
         "ticks": golden.ticks, "hash": f"{golden.hash.number:016x}", "flags": FLAGS,
         "values": {row.key: row.value for row in check_spec(axis.file).rows},
         "options": {key: value for key, value in told.items() if key in options},
@@ -164,6 +165,7 @@ def _manifest(axis: Axis, job: str, golden: Golden, program: Program) -> dict[st
         "functions": len(program.order), "tick": axis.simulated.tick,
         "misra deviations": DEVIATIONS,
         "entries": {f.cname: {"loops": loops_of(program, f)} for f in program.order if f.entry},
+        "single to double": sorted(f"{w}: {t}" for w, t in program.notes.promotions),
         "not proven": {
             "ranges that only their declaration says": sorted(f"{w}: {t}" for w, t in program.notes.claims),
             "stores and arithmetic that may wrap": sorted(f"{w}: {t}" for w, t in program.notes.wraps),

@@ -19,7 +19,7 @@ from numba.core import cgutils as untyped_cgutils
 from numba.core import types
 from numba.core.typing import templates as untyped_templates
 
-from detent.kernel.registers import Registers, Width, f8, i2
+from detent.kernel.registers import Registers, Width, declared_of, f8, i2, single
 
 # Numba's extension interface publishes no types.
 extending: Any = numba.extending
@@ -28,6 +28,7 @@ cgutils: Any = untyped_cgutils
 
 BYTE = ir.IntType(8)
 INT32, WORD = ir.IntType(32), ir.IntType(64)
+FLOAT, DOUBLE = ir.FloatType(), ir.DoubleType()
 
 
 class RegistersType(types.Type):
@@ -36,6 +37,31 @@ class RegistersType(types.Type):
     def __init__(self, registers: type[Registers]) -> None:
         self.registers = registers
         super().__init__(name=f"Registers({registers.__module__}.{registers.__qualname__})")
+
+    def __reduce__(self) -> Any:
+        """By its declaration: a class that `single` made has no name in its module."""
+        return _type_of, (declared_of(self.registers), self.registers.__declared__ is not None)
+
+
+def _type_of(registers: type[Registers], singly: bool) -> RegistersType:  # noqa: FBT001 - as it is kept
+    return RegistersType(single(registers) if singly else registers)
+
+
+class SingleType(types.Type):
+    """Numba type of a `Single`; its own float32 beside a whole number would be a float64."""
+
+    def __init__(self) -> None:
+        super().__init__(name="single")
+
+    def unify(self, typingctx: Any, other: Any) -> Any:
+        """What a variable is that is one here and another there: as an operator between both gives it."""
+        del typingctx
+        if isinstance(other, types.Integer | types.Boolean):
+            return self
+        return types.float64 if isinstance(other, types.Float) else None
+
+
+single_type = SingleType()
 
 
 class RegisterArrayType(types.Type):
@@ -115,11 +141,15 @@ def _unbox_host_array(typ: HostArrayType, obj: Any, c: Any) -> Any:
 
 
 def _scalar_type(width: Width) -> types.Type:
-    return types.float64 if width.is_float else types.int64
+    if width.is_float:
+        return single_type if width.size == 4 else types.float64
+    return types.int64
 
 
 def _storage(width: Width) -> ir.Type:
-    return ir.DoubleType() if width.is_float else ir.IntType(8 * width.size)
+    if width.is_float:
+        return FLOAT if width.size == 4 else DOUBLE
+    return ir.IntType(8 * width.size)
 
 
 def _load(builder: Any, address: Any, width: Width, place: str) -> Any:

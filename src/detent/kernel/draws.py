@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.kernel.compiled import bits_of, byte_at, put_byte
+from detent.kernel.compiled_single import single_bits_of
 from detent.kernel.image import FNV_PRIME, ImageHash
 from detent.kernel.loop import Bytes, run_controller
 from detent.kernel.registers import Registers, f8, i8, register
@@ -109,7 +110,7 @@ def draw_into(d: Draws, r: Any, places: Places, ends: Ends, mask: int) -> None:
                 offset = int(places[n, OFFSET]) + k * size
                 if places[n, IS_FLOAT] != 0:
                     value = draw_real(d, float(ends[n, 0]), float(ends[n, 1]), float(ends[n, 2]))
-                    store_bytes(r, offset, size, bits_of(value))
+                    store_bytes(r, offset, size, bits_of(value) if size == 8 else single_bits_of(value))
                 else:
                     whole = draw_whole(d, int(places[n, LO]), int(places[n, HI]), int(places[n, SPAN]))
                     store_bytes(r, offset, size, whole)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.kernel.compiled import byte_at, copy_back, local_copy, put_byte
-from detent.kernel.registers import Registers, Width
+from detent.kernel.registers import Registers, Width, declared_of
 from detent.kernel.step import hot_step, step
 
 Bytes = NDArray[np.uint8]
@@ -67,7 +67,7 @@ def controls(params: type[Registers]) -> Callable[[F], F]:
 
 def control_of(params: type[Registers]) -> Callable[..., Any]:
     """What a controller with these parameters does in a tick, as it was stated by `controls`."""
-    return _CONTROLS[params]
+    return _CONTROLS[declared_of(params)]
 
 
 def disturbs(params: type[Registers]) -> Callable[[F], F]:
@@ -101,12 +101,12 @@ def serves(params: type[Registers]) -> Callable[[F], F]:
 
 def run_serve(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operation: Any, *feed: Any) -> None:  # noqa: PLR0913 - as `serves` says
     """One look of the controller whose live parameters `q` are."""
-    _SERVES[type(q)](q, p, controller, lines, memory, operation, *feed)
+    _SERVES[declared_of(type(q))](q, p, controller, lines, memory, operation, *feed)
 
 
 @extending.overload(run_serve, jit_options={"forceinline": True})
 def _run_serve(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operation: Any, *feed: Any) -> Any:  # noqa: ARG001, PLR0913 - as above
-    serve = _SERVES[q.registers]
+    serve = _SERVES[declared_of(q.registers)]
 
     def compiled(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operation: Any, *feed: Any) -> None:  # noqa: PLR0913
         """As `run_serve`, for numba."""
@@ -117,12 +117,12 @@ def _run_serve(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operati
 
 def run_controller(p: Any, controller: Any, lines: Any, *feed: Any) -> None:
     """One tick of the controller whose parameters these are."""
-    _CONTROLS[type(p)](p, controller, lines, *feed)
+    _CONTROLS[declared_of(type(p))](p, controller, lines, *feed)
 
 
 @extending.overload(run_controller, jit_options={"forceinline": True})
 def _run_controller(p: Any, controller: Any, lines: Any, *feed: Any) -> Any:  # noqa: ARG001 - numba hands over all types
-    control = _CONTROLS[p.registers]
+    control = _CONTROLS[declared_of(p.registers)]
 
     def compiled(p: Any, controller: Any, lines: Any, *feed: Any) -> None:
         """As `run_controller`, for numba."""
@@ -133,7 +133,7 @@ def _run_controller(p: Any, controller: Any, lines: Any, *feed: Any) -> Any:  # 
 
 def run_stretch(p: Any, r: Any, most: int, *feed: Any) -> int:
     """Up to `most` ticks of the system whose parameters these are, without a row; returns how many."""
-    tick, local = _TICKS[type(p)]
+    tick, local = _TICKS[declared_of(type(p))]
     blocks = (attrgetter(local)(r),) if local else ()
     n = 0
     while n < most and tick(p, r, *blocks, *feed):
@@ -143,7 +143,7 @@ def run_stretch(p: Any, r: Any, most: int, *feed: Any) -> int:
 
 @extending.overload(run_stretch, jit_options={"forceinline": True})
 def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 - numba hands over the types of all
-    tick, local = _TICKS[p.registers]
+    tick, local = _TICKS[declared_of(p.registers)]
     outer, _, inner = local.partition(".")
 
     def plain(p: Any, r: Any, most: Any, *feed: Any) -> int:
@@ -167,9 +167,9 @@ def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 
 
 def run_disturbed(p: Any, r: Any, f: Any, most: int, *feed: Any) -> int:
     """The same as `run_stretch` while a fault is injected; where nothing can be, it is that."""
-    if type(p) not in _DISTURBS:
+    if declared_of(type(p)) not in _DISTURBS:
         return run_stretch(p, r, most, *feed)
-    tick, n = _DISTURBS[type(p)], 0
+    tick, n = _DISTURBS[declared_of(type(p))], 0
     while n < most and tick(p, r, f, *feed):
         n += 1
     return n
@@ -177,7 +177,7 @@ def run_disturbed(p: Any, r: Any, f: Any, most: int, *feed: Any) -> int:
 
 @extending.overload(run_disturbed)
 def _run_disturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 - as above
-    tick: Any = _DISTURBS.get(p.registers)
+    tick: Any = _DISTURBS.get(declared_of(p.registers))
 
     def undisturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> int:  # noqa: ARG001 - as above
         """As `run_stretch`: nothing of the axis can be injected."""

@@ -12,7 +12,9 @@ import inspect
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar, get_args
+
+from detent.kernel.single import Single
 
 if TYPE_CHECKING:
     # The metaclass of ctypes.Structure has no public name.
@@ -52,7 +54,11 @@ i1 = Annotated[int, Width("i1", ctypes.c_int8, "int8_t")]
 i2 = Annotated[int, Width("i2", ctypes.c_int16, "int16_t")]
 i4 = Annotated[int, Width("i4", ctypes.c_int32, "int32_t")]
 i8 = Annotated[int, Width("i8", ctypes.c_int64, "int64_t")]
+f4 = Annotated[float, Width("f4", ctypes.c_float, "float")]
 f8 = Annotated[float, Width("f8", ctypes.c_double, "double")]
+FOLLOWS = "in the arithmetic of the axis"
+real = Annotated[float, Width("f8", ctypes.c_double, "double"), FOLLOWS]
+"""`f8`, and `f4` in the registers of an axis whose arithmetic is single (`single`)."""
 u1_array = Annotated[list[int], Width("u1", ctypes.c_uint8, "uint8_t")]
 i2_array = Annotated[list[int], Width("i2", ctypes.c_int16, "int16_t")]
 i4_array = Annotated[list[int], Width("i4", ctypes.c_int32, "int32_t")]
@@ -71,6 +77,7 @@ class Field:
     range: tuple[float, float] | None = None  # least and largest value that is ever stored, where one is claimed
     option: bool = False  # of parameters: it chooses a variant, and is a constant of the firmware
     table: bool = False  # of arrays of parameters: numbers that firmware keeps among its constants
+    follows: bool = False  # declared `real`
     name: str = ""
     offset: int = 0  # bytes from the start of the structure
     width: Width | None = None  # None for a nested block
@@ -143,6 +150,21 @@ def _storage(name: str, hint: Any, length: int) -> tuple[Any, Width | None]:
     return ctype * length if length else ctype, widths[0]
 
 
+class _SingleField:
+    """A register of single precision: what is read is a `Single`, what is written is rounded."""
+
+    def __init__(self, stored: Any) -> None:
+        self._stored, self.offset, self.size = stored, stored.offset, stored.size
+
+    def __get__(self, registers: Any, kind: Any = None) -> Any:
+        """What it holds."""
+        return self if registers is None else Single(self._stored.__get__(registers, kind))
+
+    def __set__(self, registers: Any, value: float) -> None:
+        """Store."""
+        self._stored.__set__(registers, Single(value))
+
+
 class _RegistersMeta(type_of_structure):  # pyright: ignore[reportGeneralTypeIssues] - see above
     """Lays the structure out from the annotations of the class body."""
 
@@ -162,9 +184,15 @@ class _RegistersMeta(type_of_structure):  # pyright: ignore[reportGeneralTypeIss
                 offset=int(getattr(structure, key).offset),
                 width=width,
                 block=None if width else ctype,
+                follows=FOLLOWS in get_args(hints[key])[1:],
             )
             for key, (ctype, width) in stored.items()
         }
+        for key, (_, width) in stored.items():
+            if width is not None and width.code == "f4":
+                if declared[key].length:
+                    raise TypeError(f"register {key!r}: got an array of f4; expected: one value; declare f8_array")
+                setattr(structure, key, _SingleField(vars(structure)[key]))
         if os.environ.get("DETENT_CHECK_RANGES") == "1":
             structure.__setattr__ = _set_checked
 
@@ -195,6 +223,7 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
     """
 
     __fields__: "dict[str, Field]" = {}  # noqa: RUF012 - replaced per class by the metaclass
+    __declared__: "type[Registers] | None" = None  # of one that `single` made: the class of the declaration
 
     @classmethod
     def leaves(cls, prefix: str = "", offset: int = 0, by: str = "") -> Iterator[Leaf]:
@@ -223,3 +252,50 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
     def copy(self) -> Self:
         """Independent copy."""
         return type(self).from_buffer_copy(self)
+
+
+R = TypeVar("R", bound=Registers)
+_SINGLES: dict[type[Registers], type[Registers]] = {}
+
+
+def single(registers: type[R]) -> type[R]:
+    """The same registers for an axis whose arithmetic is single: those declared `real` are f4, in blocks too.
+
+    Where nothing is declared so, the class itself. Steps are the same: what they compute follows what they read.
+    """
+    if registers not in _SINGLES:
+        _SINGLES[registers] = _made_single(registers)
+    made: Any = _SINGLES[registers]
+    return made
+
+
+def _made_single(registers: type[Registers]) -> type[Registers]:
+    fields = vars(registers).get("__fields__", {})
+    bases: list[Any] = list(registers.__bases__)
+    bases = [single(one) if issubclass(one, Registers) and one is not Registers else one for one in bases]
+    blocks = {field.block: single(field.block) for field in fields.values() if field.block is not None}
+    same = bases == list(registers.__bases__) and all(one is made for one, made in blocks.items())
+    if same and not any(field.follows for field in fields.values()):
+        return registers
+    own = {key: value for key, value in vars(registers).items() if key not in _OF_A_CLASS}
+    hints = inspect.get_annotations(registers, eval_str=True)
+    hints |= {name: f4 for name, field in fields.items() if field.follows}
+    hints |= {name: blocks[field.block] for name, field in fields.items() if field.block is not None}
+    made = {name: _in_single(field) if field.follows else field for name, field in fields.items()}
+    own |= {"__annotations__": hints, "__declared__": registers, "__qualname__": f"Single{registers.__qualname__}"}
+    metaclass: Any = type(Registers)
+    return metaclass(f"Single{registers.__name__}", tuple(bases), own | made)
+
+
+def _in_single(field: Field) -> Field:
+    """A declaration whose range ends at singles."""
+    ends = None if field.range is None else tuple(float(Single(end)) for end in field.range)
+    return replace(field, range=ends)  # pyright: ignore[reportArgumentType] - two
+
+
+_OF_A_CLASS = frozenset(("_fields_", "__fields__", "__dict__", "__weakref__", "__setattr__"))
+
+
+def declared_of(registers: Any) -> type[Registers]:
+    """The class of the declaration, of one that `single` made too."""
+    return registers.__declared__ or registers

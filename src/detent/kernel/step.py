@@ -17,7 +17,7 @@ from numba.core import types as untyped_types
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult as UntypedCompileResult
 
-import detent.kernel.compiled  # noqa: F401  # pyright: ignore[reportUnusedImport] - registers numba's types
+import detent.kernel.compiled_single  # noqa: F401  # pyright: ignore[reportUnusedImport] - registers numba's types
 from detent.kernel.cache import compiled_folder, keep, read_kept, step_sources, tell_compiling
 
 numba: Any = untyped_numba  # its annotations leave out an option that we use

@@ -364,6 +364,11 @@ class Method(Protocol[SpecT]):
         """Class of what does not change while it runs."""
         return self.brought(self.params)
 
+    def arithmetic(self, spec: SpecT) -> str:
+        """What its controller computes in: "double", or "single" (`kernel.registers.single`)."""
+        del spec
+        return "double"
+
     def tick(self, spec: SpecT) -> float:
         """Base tick [s]."""
         del spec

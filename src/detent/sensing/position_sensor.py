@@ -5,7 +5,8 @@ count is a velocity resolution per T: the span and the filter trade this noise f
 constant of the filter.
 """
 
-from detent.kernel.registers import Registers, f8, f8_array, i8, register, u1
+from detent.kernel.registers import Registers, f8, f8_array, i8, real, register, u1
+from detent.kernel.single import alike
 from detent.kernel.step import step
 
 MEMORY = 64  # samples kept; delay and span together are shorter
@@ -22,11 +23,11 @@ class EncoderWord(Registers):
 class PositionSensorParams(Registers):
     """Graduation and evaluation."""
 
-    period: f8 = register("time between two samples", unit="s", range=(1e-6, 0.1))
+    period: real = register("time between two samples", unit="s", range=(1e-6, 0.1))
     resolution: f8 = register("travel per count; 0: the encoder is an ideal one", unit="m")
     delay: i8 = register("samples until a position is read", unit="count", range=(0, MEMORY - 1))
     span: i8 = register("number of samples of the velocity difference, 1 or more", unit="count", range=(1, MEMORY - 1))
-    smoothing: f8 = register("part of a new velocity that is taken over at a sample; 1: no filter", unit="1")
+    smoothing: real = register("part of a new velocity that is taken over at a sample; 1: no filter", unit="1")
     unused: u1 = register(
         "places of the memory that are not used: all but a power of two, more than delay and span together",
         unit="count", range=(0, MEMORY - 1), option=True,
@@ -38,7 +39,7 @@ class PositionSensor(Registers):
 
     zero: f8 = register("position of count 0", unit="m")
     position: f8 = register("position read", unit="m")
-    velocity: f8 = register("velocity of the positions read", unit="m/s")
+    velocity: real = register("velocity of the positions read", unit="m/s")
     place: i8 = register("place of the last sample in the memory", unit="count", range=(0, MEMORY - 1))
     memory: f8_array = register("last positions", unit="m", length=MEMORY)
 
@@ -66,7 +67,7 @@ def read_word(p: PositionSensorParams, r: PositionSensor, word: EncoderWord) -> 
     r.memory[r.place] = last if word.lost else position_of(p, r, word)
     r.position = r.memory[(r.place - p.delay) & mask]
     before = r.memory[(r.place - p.delay - p.span) & mask]
-    r.velocity += p.smoothing * ((r.position - before) / (p.span * p.period) - r.velocity)
+    r.velocity += p.smoothing * (alike(r.velocity, r.position - before) / (p.span * p.period) - r.velocity)
 
 
 @step

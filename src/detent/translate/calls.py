@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from detent.kernel import compiled
+from detent.kernel import compiled, single
 from detent.translate.expressions import Expressions
 from detent.translate.values import (
     HIGHEST,
@@ -24,6 +24,7 @@ from detent.translate.values import (
     type_of_local,
     whole,
     widen,
+    wider,
 )
 
 
@@ -70,7 +71,7 @@ class Calls(Expressions):
         if g.result_kind == "bool":
             return truth(text, 0)
         if g.result_kind == "float":
-            return real(text)
+            return real(text, ctype=g.result.ctype if g.result is not None else "double" if self.final else "float")
         return Value(kind=g.result_kind, text=text, registers=g.result_class)
 
     def _argument(self, node: ast.Call, g: Any, name: str, value: Value) -> str:
@@ -82,8 +83,8 @@ class Calls(Expressions):
             if not same:
                 raise outside_language(node, f"{ast.unparse(node)}, whose {name} is another", "hand over what it takes")
             return value.text
-        if wanted is not None and wanted.kind == "float":
-            return self.as_real(value).text
+        if name in g.reals:
+            return self._real_argument(node, g, name, value)
         if wanted is not None and wanted.kind == "bool":
             return as_truth(value).text
         value = as_whole(value)
@@ -100,7 +101,30 @@ class Calls(Expressions):
         # An entry takes the width of its declaration, any other step a type to compute in.
         return self.cast(value, wanted.ctype if g.entry and wanted is not None else type_of_local(g.names[name])).text
 
+    def _real_argument(self, node: ast.Call, g: Any, name: str, value: Value) -> str:
+        """A float as the step takes it: of the precision in which all calls hand it over."""
+        value = as_whole(value)
+        if value.kind not in ("int", "float"):
+            raise outside_language(node, f"{value.kind} for {name}", "hand over what it takes")
+        before: Value | None = g.names[name]
+        given = value.ctype if value.kind == "float" else ""
+        ctype = wider(before.ctype if before is not None else "", given)
+        if before is None or before.ctype != ctype:
+            g.names[name] = real(name, ctype=ctype)
+            self.program.changed = True
+        if self.final and given == "float" and ctype != "float":
+            got = f"a single for {name}, of {g.py.__name__}, which is a double elsewhere"
+            raise outside_language(node, got, "hand over one precision, or float(x)")
+        return self.in_float(value, ctype).text
+
     # ---- functions that are known
+
+    def _whole_of(self, node: ast.Call) -> Value:
+        """The argument of what gives a whole number."""
+        value = self._one(node)
+        if value.is_single:
+            raise outside_language(node, f"{ast.unparse(node)} of a single", "write float(x) in it")
+        return value
 
     def _one(self, node: ast.Call) -> Value:
         if len(node.args) != 1:
@@ -109,11 +133,28 @@ class Calls(Expressions):
 
     def k_sqrt(self, node: ast.Call) -> Value:
         """Square root, which is rounded correctly everywhere."""
-        return real(f"sqrt({self.as_real(self._one(node)).text})")
+        value = self._one(node)
+        if value.is_single:
+            raise outside_language(node, "math.sqrt of a single", "use that of kernel.single")
+        return real(f"sqrt({self.as_real(value).text})")
+
+    def k_sqrt_alike(self, node: ast.Call) -> Value:
+        """The same in the precision of its argument."""
+        value = self._one(node)
+        return real(f"sqrtf({value.text})", ctype="float") if value.is_single else real(f"sqrt({value.text})")
+
+    def k_alike(self, node: ast.Call) -> Value:
+        """A number in the precision of another one."""
+        if len(node.args) != 2:
+            raise outside_language(node, f"{len(node.args)} arguments", "hand over a model and a number")
+        model, value = self.ordered(node.args)
+        if model.kind != "float" or model.acts:
+            raise outside_language(node, f"a model {ast.unparse(node.args[0])}", "name a register or a variable")
+        return self.in_float(as_whole(value), model.ctype)
 
     def k_floor(self, node: ast.Call) -> Value:
         """Whole number below."""
-        value = self._one(node)
+        value = self._whole_of(node)
         if value.kind != "float":
             return as_whole(value)
         self.helper("to_i64", "")
@@ -121,7 +162,7 @@ class Calls(Expressions):
 
     def k_round(self, node: ast.Call) -> Value:
         """Nearest whole number, the even one of two as near."""
-        value = self._one(node)
+        value = self._whole_of(node)
         if value.kind != "float":
             return as_whole(value)
         for one in ("to_i64", "floor"):
@@ -130,7 +171,7 @@ class Calls(Expressions):
 
     def k_int(self, node: ast.Call) -> Value:
         """Whole number towards zero; outside of 64 bits the nearest there is."""
-        value = self._one(node)
+        value = self._whole_of(node)
         if value.kind != "float":
             return as_whole(value)
         return whole(f"{self.helper('to_i64', '')}({value.text})", "int64_t", LOWEST, HIGHEST)
@@ -146,6 +187,8 @@ class Calls(Expressions):
     def k_abs(self, node: ast.Call) -> Value:
         """Magnitude."""
         value = as_whole(self._one(node))
+        if value.is_single:
+            return real(f"fabsf({value.text})", ctype="float")
         return real(f"fabs({value.text})") if value.kind == "float" else self.magnitude(node, value)
 
     def k_len(self, node: ast.Call) -> Value:
@@ -165,10 +208,11 @@ class Calls(Expressions):
             return self.extreme(name, values)
         if not all(one.kind in ("int", "float") for one in values):
             raise outside_language(node, f"{name} of no numbers", "use numbers")
-        text = self.as_real(values[0]).text
+        values, ctype = self.alike(node, *values)
+        text = values[0].text
         for one in values[1:]:
-            text = f"{self.helper(f'{name}_f8', '')}({text}, {self.as_real(one).text})"
-        return real(text)
+            text = f"{self.helper(f'{name}_f4' if ctype == 'float' else f'{name}_f8', '')}({text}, {one.text})"
+        return real(text, ctype=ctype)
 
     def k_min(self, node: ast.Call) -> Value:
         """The least."""
@@ -185,12 +229,14 @@ class Calls(Expressions):
 
     def k_bits_of(self, node: ast.Call) -> Value:
         """The bits of a float."""
-        text = f"{self.helper('bits_of', '')}({self.as_real(self._one(node)).text})"
+        text = f"{self.helper('bits_of', '')}({self.as_real(self._whole_of(node)).text})"
         return whole(text, "int64_t", LOWEST, HIGHEST)
 
 
 KNOWN: dict[Any, Callable[[Calls, ast.Call], Value]] = {
     math.sqrt: Calls.k_sqrt,
+    single.sqrt: Calls.k_sqrt_alike,
+    single.alike: Calls.k_alike,
     math.floor: Calls.k_floor,
     builtins.int: Calls.k_int,
     builtins.round: Calls.k_round,

@@ -1,10 +1,15 @@
 """Everything that has a value, but for calls."""
 
 import ast
+import math
 from dataclasses import replace
 
+import numpy as np
+
 from detent.kernel.registers import Field, Registers
+from detent.kernel.single import Single
 from detent.translate.integers import Integers
+from detent.translate.known import FLIPPED
 from detent.translate.values import (
     ANY,
     ATOM,
@@ -17,6 +22,7 @@ from detent.translate.values import (
     RefusedError,
     Table,
     Value,
+    as_single_number,
     as_truth,
     as_whole,
     bits_of,
@@ -137,7 +143,7 @@ class Expressions(Integers):
         if fixed is not None:
             return number(fixed)
         if found.width.is_float:
-            return real(place)
+            return real(place, ctype=found.width.c_name)
         width, claimed = self.program.stored(registers, found)
         lo, hi = interval_of(width)
         if claimed is not None:
@@ -167,7 +173,7 @@ class Expressions(Integers):
         if array.width is None:
             raise outside_language(node, f"{text}, which has no width", "declare one")
         if array.width.is_float:
-            return real(text)
+            return real(text, ctype=array.width.c_name)
         lo, hi = interval_of(array.width)
         if array.within is not None:
             lo, hi = max(lo, int(array.within[0])), min(hi, int(array.within[1]))
@@ -191,14 +197,16 @@ class Expressions(Integers):
         """An operator between two numbers."""
         a, b = (as_whole(one) for one in self.ordered([node.left, node.right]))
         if isinstance(node.op, ast.Div):
-            a, b = self.as_real(a), self.as_real(b)
-            return real(f"{self.beside(a, PRODUCT)} / {in_brackets(b, UNARY)}", PRODUCT)
+            a, b, ctype = self.met(node, a, b) if "float" in (a.kind, b.kind) else (
+                self.as_real(a), self.as_real(b), "double"
+            )  # fmt: skip
+            return real(f"{self.beside(a, PRODUCT)} / {in_brackets(b, UNARY)}", PRODUCT, ctype)
         if "float" in (a.kind, b.kind):
             if type(node.op) not in REAL_SIGNS:
                 raise outside_language(node, f"{type(node.op).__name__} of floats", "use + - * /")
             sign, level = REAL_SIGNS[type(node.op)]
-            a, b = self.as_real(a), self.as_real(b)
-            return real(f"{self.beside(a, level)} {sign} {in_brackets(b, UNARY)}", level)
+            a, b, ctype = self.met(node, a, b)
+            return real(f"{self.beside(a, level)} {sign} {in_brackets(b, UNARY)}", level, ctype)
         if not a.kind == b.kind == "int":
             raise outside_language(node, f"an operator of {a.kind} and {b.kind}", "use numbers")
         return self.integer(node, a, b)
@@ -213,7 +221,9 @@ class Expressions(Integers):
             return decided(not value.truth) if value.truth is not None else truth(f"!{in_brackets(value, ATOM)}", UNARY)
         if isinstance(node.op, ast.USub):
             value = as_whole(value)
-            return real(f"-{in_brackets(value, ATOM)}", UNARY) if value.kind == "float" else self.negative(node, value)
+            if value.kind == "float":
+                return real(f"-{in_brackets(value, ATOM)}", UNARY, value.ctype)
+            return self.negative(node, value)
         raise outside_language(node, f"the operator {type(node.op).__name__}", "use - or not")
 
     def _negated(self, node: ast.Constant) -> Value:
@@ -281,8 +291,8 @@ class Expressions(Integers):
             return replace(a, text=f"({test.text}) ? {a.text} : {b.text}", level=ANY + 1)
         a, b = as_whole(a), as_whole(b)
         if "float" in (a.kind, b.kind):
-            a, b = self.as_real(a), self.as_real(b)
-            return real(f"({test.text}) ? {in_brackets(a, UNARY)} : {in_brackets(b, UNARY)}", ANY + 1)
+            (a, b), ctype = self.alike(node, a, b)
+            return real(f"({test.text}) ? {in_brackets(a, UNARY)} : {in_brackets(b, UNARY)}", ANY + 1, ctype)
         if not a.kind == b.kind == "int":
             raise outside_language(node, f"a choice between {a.kind} and {b.kind}", "choose between numbers")
         lo, hi = min(a.lo, b.lo), max(a.hi, b.hi)
@@ -330,7 +340,7 @@ class Expressions(Integers):
         if op not in SIGNS:
             raise outside_language(node, f"the comparison {op.__name__}", "use < <= > >= == != in")
         if "float" in (a.kind, b.kind):
-            a, b = self.as_real(a), self.as_real(b)
+            a, b, _ = self.met(node, *beside_single(op, a, b))
             return truth(f"{in_brackets(a, UNARY)} {SIGNS[op]} {in_brackets(b, UNARY)}")
         if a.kind == b.kind == "bool" and a.truth is None and b.truth is None:
             return truth(f"{in_brackets(a, UNARY)} {SIGNS[op]} {in_brackets(b, UNARY)}")
@@ -349,6 +359,27 @@ class Expressions(Integers):
             bits = 64 if RANK[a.ctype] == 64 or RANK[b.ctype] == 64 else bits_of(a.lo, a.hi, b.lo, b.hi)
             _, (a, b) = self.brought_to(bits, a, b)
         return truth(f"{in_brackets(a, UNARY)} {SIGNS[op]} {in_brackets(b, UNARY)}")
+
+
+def beside_single(op: type[ast.cmpop], a: Value, b: Value) -> tuple[Value, Value]:
+    """Both sides of a comparison: a number beside a single as the next single on the side that keeps its truth.
+
+    Where no single is equal to it, ``==`` stays one of doubles.
+    """
+    if b.is_single and a.given is not None and not a.is_single:
+        b, a = beside_single(FLIPPED[op], b, a)
+        return a, b
+    if not a.is_single or b.given is None or b.is_single:
+        return a, b
+    near = Single(b.given)
+    if near == b.given:
+        return a, as_single_number(b.given)
+    if op in (ast.Eq, ast.NotEq):
+        return a, b
+    upward = op in (ast.Lt, ast.GtE)  # x < c holds for the same singles as x < the least single above c
+    if (near < b.given) == upward:
+        near = float(np.nextafter(np.float32(near), np.float32(math.inf if upward else -math.inf)))
+    return a, as_single_number(near)
 
 
 def array_of(table: Table, kind: str) -> Value:

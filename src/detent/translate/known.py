@@ -22,6 +22,7 @@ from detent.translate.values import (
     UNSIGNED,
     RefusedError,
     Value,
+    as_single_number,
     as_whole,
     bits_of,
     in_brackets,
@@ -202,6 +203,8 @@ class Known:
 
     def as_real(self, value: Value) -> Value:
         """A number as a float, as Python takes it beside one."""
+        if value.is_single:
+            return self.in_other_float(value, "double")
         if value.kind == "float":
             return value
         if value.kind == "bool" and value.truth is None:
@@ -212,6 +215,49 @@ class Known:
         if value.is_composite:
             return real(f"{self.helper(f'f64_of_{SHORT[value.ctype]}', '')}({value.text})")
         return real(f"(double){in_brackets(value, UNARY)}", UNARY)
+
+    def as_single(self, value: Value) -> Value:
+        """A number as one of single precision; a whole number beside such a one, a float where it is stored."""
+        if value.kind == "float":
+            return value if value.is_single else self.in_other_float(value, "float")
+        if value.kind == "bool" and value.truth is None:
+            return real(f"{in_brackets(value, UNARY)} ? 1.0f : 0.0f", ANY + 1, "float")
+        value = as_whole(value)
+        if value.is_constant and bits_of(value.lo) <= 32:
+            return as_single_number(value.lo)
+        if value.is_composite:
+            return real(f"{self.helper(f'f32_of_{SHORT[value.ctype]}', '')}({value.text})", ctype="float")
+        return real(f"(float){in_brackets(value, UNARY)}", UNARY, "float")
+
+    def in_float(self, value: Value, ctype: str) -> Value:
+        """A number as a float of this type."""
+        return self.as_single(value) if ctype == "float" else self.as_real(value)
+
+    def in_other_float(self, value: Value, ctype: str) -> Value:
+        """A float in the other precision: a cast, or a function where it is an operator's result (MISRA C 10.8)."""
+        if value.given is not None:
+            return as_single_number(value.given) if ctype == "float" else number(value.given)
+        if value.is_composite:
+            name = "f32_of_f64" if ctype == "float" else "f64_of_f32"
+            return real(f"{self.helper(name, '')}({value.text})", ctype=ctype)
+        return real(f"({ctype}){in_brackets(value, UNARY)}", UNARY, ctype)
+
+    def met(self, node: ast.AST, a: Value, b: Value) -> tuple[Value, Value, str]:
+        """Two numbers, one of them a float, in the precision in which they meet: single beside single or whole ones."""
+        if not any(one.kind == "float" and not one.is_single for one in (a, b)):
+            return self.as_single(a), self.as_single(b), "float"
+        if self.final and (a.is_single or b.is_single):
+            self.program.notes.promotions.add((self.f.where(node), ast.unparse(node)))
+        return self.as_real(a), self.as_real(b), "double"
+
+    def alike(self, node: ast.AST, *values: Value) -> tuple[list[Value], str]:
+        """Numbers, one of them a float, of which one is chosen: all of one precision, or whole."""
+        kinds = {one.ctype for one in values if one.kind == "float"}
+        if len(kinds) > 1 and self.final:
+            remedy = "a constant as a whole number, or alike(model, value)"
+            raise outside_language(node, f"a choice between single and double precision, {ast.unparse(node)}", remedy)
+        ctype = "float" if kinds == {"float"} else "double"
+        return [self.in_float(one, ctype) for one in values], ctype
 
     # ---- facts
 

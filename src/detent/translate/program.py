@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import detent
-from detent.kernel.registers import Field, Registers, Width, i8
+from detent.kernel.registers import Field, Registers, Width, declared_of, i8
 from detent.translate.expressions import array_of
 from detent.translate.statements import Statements, names_written, targets_of
 from detent.translate.values import (
@@ -35,6 +35,9 @@ from detent.translate.values import (
 TURNS, EXACT = 60, 24  # turns over the program at most, and of these the ones in which intervals grow as they are
 PACKAGE = Path(detent.__file__).parent
 KINDS = {"bool": "bool", "float": "double", "none": "void"}
+
+
+Kinds = Mapping[type[Registers], type[Registers]]  # by the class of the annotations, the one that is translated
 
 
 def snake(name: str) -> str:
@@ -66,8 +69,8 @@ class _Renamer(ast.NodeTransformer):
 class Function:
     """One step: its text in Python, and what is known of its parameters, variables and result."""
 
-    def __init__(self, py: Callable[..., Any], cname: str, *, entry: bool) -> None:
-        self.py, self.cname, self.entry = py, cname, entry
+    def __init__(self, py: Callable[..., Any], cname: str, kinds: Kinds, *, entry: bool) -> None:
+        self.py, self.cname, self.entry, self.kinds = py, cname, entry, kinds
         lines, self.first = inspect.getsourcelines(py)
         self.source = textwrap.dedent("".join(lines))
         tree = ast.parse(self.source).body[0]
@@ -82,16 +85,17 @@ class Function:
         originals = [a.arg for a in tree.args.args]
         self.tree: ast.FunctionDef = _Renamer(own & C_WORDS).visit(tree)
         self.parameters = [a.arg for a in self.tree.args.args]
+        self.reals = set[str]()  # parameters that are floats
         self.names: dict[str, Value | None] = {
             name: self._parameter(name, hints.get(original))
             for name, original in zip(self.parameters, originals, strict=True)
         }
         hint = hints.get("return")
         self.result_class: type[Registers] | None = (
-            hint if isinstance(hint, type) and issubclass(hint, Registers) else None
+            self.kinds.get(hint, hint) if isinstance(hint, type) and issubclass(hint, Registers) else None
         )
-        kinds: dict[Any, str] = {None: "none", type(None): "none", bool: "bool", float: "float", int: "int"}
-        self.result_kind = "file" if self.result_class else kinds.get(hint, "")
+        results: dict[Any, str] = {None: "none", type(None): "none", bool: "bool", float: "float", int: "int"}
+        self.result_kind = "file" if self.result_class else results.get(hint, "")
         if not self.result_kind:
             raise RefusedError("FW02", tree, f"a result {hint}", "int, float, bool, registers or None", "store it")
         self.result: Value | None = None
@@ -106,7 +110,7 @@ class Function:
 
     def _parameter(self, name: str, hint: Any) -> Value | None:
         if isinstance(hint, type) and issubclass(hint, Registers):
-            return Value(kind="file", text=name, registers=hint)
+            return Value(kind="file", text=name, registers=self.kinds.get(hint, hint))
         width = next((one for one in get_args(hint)[1:] if isinstance(one, Width)), None)
         if width is not None and get_args(hint)[0] is Any:
             return Value(kind="signal", text=name, width=width)
@@ -115,7 +119,8 @@ class Function:
         if hint is int:
             return whole(name, "int64_t", *interval_of(get_args(i8)[1])) if self.entry else None
         if hint is float or (width is not None and width.is_float):
-            return real(name)
+            self.reals.add(name)
+            return real(name) if self.entry else None
         if hint is bool:
             return truth(name, 0)
         raise RefusedError("FW02", None, f"{name}: {hint}", "registers, int, float, bool or a signal", "annotate it so")
@@ -185,6 +190,8 @@ class Program:
     ) -> None:
         self.name, self.options, self.roots = name, dict(options or {}), dict(roots or {})
         self.shape = shape or Shape()
+        self.kinds: Kinds = {declared_of(one): one for root in (*self.roots, *([params] if params else []))
+                             for one in blocks_of(root)}  # fmt: skip
         self.steps: dict[Callable[..., Any], Function] = {}
         self.notes = Notes()
         self.changed, self.widens = False, False
@@ -216,7 +223,7 @@ class Program:
             if made in taken:
                 raise RefusedError("FW13", None, f"two functions {made}", "names that differ", "rename a step")
             try:
-                self.steps[py] = f = Function(py, made, entry=bool(cname))
+                self.steps[py] = f = Function(py, made, self.kinds, entry=bool(cname))
                 for name, value in f.names.items():
                     if value is not None and value.kind == "signal":
                         f.names[name] = self._signal(name, value)
@@ -291,7 +298,7 @@ class Program:
 
     def struct(self, registers: type[Registers]) -> str:
         """Name in C of a class of registers."""
-        made = f"{self.name}_{self.roots.get(registers) or snake(registers.__name__)}"
+        made = f"{self.name}_{self.roots.get(registers) or snake(declared_of(registers).__name__)}"
         if self.structs.setdefault(made, registers) is not registers:
             raise RefusedError(
                 "FW13", None, f"two structures {made}", "names that differ", "rename a class of registers"
@@ -383,7 +390,7 @@ class Program:
         elif f.result_class is not None:
             result = f"{self.struct(f.result_class)} *"
         else:
-            result = KINDS[f.result_kind]
+            result = f.result.ctype if f.result_kind == "float" and f.result is not None else KINDS[f.result_kind]
         parts: list[str] = []
         for name in self.arguments(f):
             value = f.names[name]

@@ -26,6 +26,7 @@ from detent.translate.values import (
     unsigned,
     whole,
     widen,
+    wider,
 )
 
 ZERO = {"float": "0.0", "bool": "false", "file": "NULL", "int": "0"}
@@ -69,7 +70,8 @@ class Statements(Calls):
             value = self.f.names.get(name)
             if value is not None:
                 self.declared.add(name)
-                self.line(f"{self.declaration(value, name)} = {ZERO[value.kind]};")
+                zero = "0.0f" if value.is_single else ZERO[value.kind]
+                self.line(f"{self.declaration(value, name)} = {zero};")
         self.block(body)
         text = "\n".join(self.lines)
         unused = [name for name in self.program.arguments(self.f) if not re.search(rf"\b{name}\b", text)]
@@ -137,7 +139,7 @@ class Statements(Calls):
         if kind == "bool":
             value = as_truth(value)
         elif kind == "float":
-            value = self.as_real(value)
+            value = self._returned(value)
         elif kind == "int":
             value = as_whole(value)
         if value.kind != kind:
@@ -151,6 +153,17 @@ class Statements(Calls):
             value = self.cast(value, type_of_local(made))
         self.flush()
         self.line(f"return {value.text};")
+
+    def _returned(self, value: Value) -> Value:
+        """A float as the result: a single where all that is returned are singles, or whole numbers."""
+        value, old = as_whole(value), self.f.result
+        if value.kind == "float":
+            ctype = wider(old.ctype if old is not None else "", value.ctype)
+            if old is None or old.ctype != ctype:
+                self.f.result, self.program.changed = real("", ctype=ctype), True
+        if value.kind not in ("int", "float"):
+            return value
+        return self.in_float(value, self.f.result.ctype if self.f.result is not None else "double")
 
     # ---- branches and loops
 
@@ -332,7 +345,10 @@ class Statements(Calls):
         made = widen(old, made) if self.program.widens else made
         if made.kind == "int":
             made = replace(made, ctype=type_of_local(made))
-        if old is None or (old.kind, old.lo, old.hi) != (made.kind, made.lo, made.hi):
+        if made.kind == "float":
+            made = replace(made, given=None)
+        grown = old is None or (old.kind, old.lo, old.hi) != (made.kind, made.lo, made.hi)
+        if old is None or grown or (made.kind == "float" and old.ctype != made.ctype):
             self.program.changed = True
         made = self.f.names[name] = replace(made, text=name)
         return made
@@ -385,8 +401,13 @@ class Statements(Calls):
         have = self.note(target.id, value)
         if have.kind == "int":
             text = self.cast(as_whole(value), type_of_local(have)).text
+        elif have.kind == "float":
+            if self.final and value.kind == "float" and value.ctype != have.ctype:
+                got = f"{target.id} for single and for double precision"
+                raise outside_language(target, got, "use two names, or alike(model, value)")
+            text = self.in_float(value, have.ctype).text
         else:
-            text = self.as_real(value).text if have.kind == "float" else value.text
+            text = value.text
         if target.id in self.declared:
             if text != target.id:  # what is left of a choice that was folded
                 self.line(f"{target.id} = {text};")
@@ -406,7 +427,7 @@ class Statements(Calls):
     def narrowed(self, value: Value, width: Width, claimed: tuple[float, float] | None, node: ast.AST) -> str:
         """Text of a value as a register takes it: wrapped to its width; a claim that is not proven can be checked."""
         if width.is_float:
-            return self.as_real(value).text
+            return self.in_float(value, width.c_name).text
         given, value = value, as_whole(value)
         if value.kind != "int":
             raise outside_language(node, "a float in an integer register", "write int()")

@@ -88,6 +88,8 @@ HELPERS = {
     "max": "{t} N(max_{c})({t} a, {t} b)\n{{\n    return (b > a) ? b : a;\n}}\n",
 }
 WHOLE_HELPERS = {
+    "min_f4": "float N(min_f4)(float a, float b)\n{\n    return (b < a) ? b : a;\n}\n",
+    "max_f4": "float N(max_f4)(float a, float b)\n{\n    return (b > a) ? b : a;\n}\n",
     "min_f8": "double N(min_f8)(double a, double b)\n{\n    return (b < a) ? b : a;\n}\n",
     "max_f8": "double N(max_f8)(double a, double b)\n{\n    return (b > a) ? b : a;\n}\n",
     "to_i64": """int64_t N(to_i64)(double x)
@@ -196,7 +198,7 @@ CLAIMED = """{storage}int64_t N(claimed)(int64_t value, int64_t lowest, int64_t 
 }}
 """
 CONVERTED = "{to} N({name})({of} value)\n{{\n    return ({to})value;\n}}\n"
-LONG = {short: ctype for ctype, short in SHORT.items()} | {"f64": "double"}
+LONG = {short: ctype for ctype, short in SHORT.items()} | {"f64": "double", "f32": "float"}
 
 
 def helper_text(name: str, prefix: str, storage: str = "static ") -> str:
@@ -303,7 +305,7 @@ def code_text(program: Program) -> str:
     constants = "".join(f"#define {name} {text}\n" for name, (_, text) in sorted(program.notes.constants.items()))
     functions = "\n".join(program.texts[f.py] for f in program.order)
     body = "\n".join(part for part in (constants, helpers_text(program), functions) if part)
-    needs_math = any(word in body for word in ("sqrt(", "fabs(", "INFINITY"))
+    needs_math = any(word in body for word in ("sqrt(", "fabs(", "sqrtf(", "fabsf(", "INFINITY"))
     includes = ["<math.h>"] if needs_math else []
     includes += ["<stddef.h>"] if "NULL" in functions else []
     includes += ["<string.h>"] if "memcpy(" in body else []

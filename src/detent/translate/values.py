@@ -1,6 +1,7 @@
 """What is known of an expression: its text in C, its type, the interval of an integer."""
 
 import ast
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -8,6 +9,7 @@ from typing import Any
 
 from detent.errors import DetentError
 from detent.kernel.registers import Field, Registers, Width
+from detent.kernel.single import Single
 
 INTEGERS = {
     "u1": "uint8_t", "u2": "uint16_t", "u4": "uint32_t", "i1": "int8_t", "i2": "int16_t", "i4": "int32_t",
@@ -90,12 +92,18 @@ class Value:
     element: str = "{text}[{index}]"  # text of an element of an array or a signal
     within: tuple[float, float] | None = None  # range of its elements
     literal: bool = False  # a number, or the name of one
+    given: float | None = None  # of a float: the number that it is
     of: "tuple[str, Value, Value] | None" = None  # operator and operands, whose lower bits alone make its lower bits
 
     @property
     def is_constant(self) -> bool:
         """True for an integer that can only be one number, and whose text does nothing else."""
         return self.kind == "int" and self.lo == self.hi and not self.acts
+
+    @property
+    def is_single(self) -> bool:
+        """True for a float of single precision."""
+        return self.kind == "float" and self.ctype == "float"
 
     @property
     def is_composite(self) -> bool:
@@ -113,9 +121,22 @@ def whole(text: str, ctype: str, lo: int, hi: int, level: int = ATOM) -> Value:
     return Value(kind="int", text=text, ctype=ctype, lo=lo, hi=hi, level=level)
 
 
-def real(text: str, level: int = ATOM) -> Value:
-    """A float of 64 bits."""
-    return Value(kind="float", text=text, ctype="double", level=level)
+def real(text: str, level: int = ATOM, ctype: str = "double") -> Value:
+    """A float, of 64 bits unless told otherwise."""
+    return Value(kind="float", text=text, ctype=ctype, level=level)
+
+
+def wider(one: str, other: str) -> str:
+    """The type that holds floats of both; "" is one of which nothing is known yet."""
+    return "double" if "double" in (one, other) else one or other
+
+
+def as_single_number(value: float) -> Value:
+    """The nearest constant of single precision."""
+    rounded = float(Single(value))
+    if math.isinf(rounded):
+        return replace(real(f"{'-' if rounded < 0 else ''}INFINITY", UNARY, "float"), given=rounded)
+    return replace(real(f"{rounded!r}f" if rounded >= 0 else f"({rounded!r}f)", ctype="float"), given=rounded)
 
 
 def truth(text: str, level: int = ANY, decided: bool | None = None) -> Value:  # noqa: FBT001 - a truth value
@@ -149,6 +170,8 @@ def in_brackets(value: Value, level: int) -> str:
 
 def number(value: float) -> Value:
     """A constant."""
+    if isinstance(value, Single):
+        return as_single_number(value)
     if isinstance(value, bool):
         return decided(value)
     if isinstance(value, int):
@@ -163,8 +186,8 @@ def number(value: float) -> Value:
     if value != value:  # noqa: PLR0124 - not a number
         raise RefusedError("FW02", None, "a constant that is no number", "a number", "write another one")
     if value in (float("inf"), -float("inf")):
-        return real(f"{'-' if value < 0 else ''}(double)INFINITY", UNARY)
-    return real(repr(value) if value >= 0 else f"({value!r})")
+        return replace(real(f"{'-' if value < 0 else ''}(double)INFINITY", UNARY), given=value)
+    return replace(real(repr(value) if value >= 0 else f"({value!r})"), given=value)
 
 
 def as_whole(value: Value) -> Value:
@@ -185,7 +208,7 @@ def as_truth(value: Value) -> Value:
             return decided(value.lo != 0)
         return truth(f"{in_brackets(value, UNARY)} != {'0U' if value.ctype in UNSIGNED else '0'}")
     if value.kind == "float":
-        return truth(f"{in_brackets(value, UNARY)} != 0.0")
+        return truth(f"{in_brackets(value, UNARY)} != {'0.0f' if value.is_single else '0.0'}")
     raise outside_language(ast.Pass(), f"a condition of kind {value.kind}", "compare numbers")
 
 
@@ -204,6 +227,8 @@ def join(one: Value | None, other: Value) -> Value:
         return replace(one, lo=min(one.lo, other.lo), hi=max(one.hi, other.hi))
     if {one.kind, other.kind} == {"int", "float"}:
         return one if one.kind == "float" else other
+    if one.kind == other.kind == "float":
+        return replace(one, ctype=wider(one.ctype, other.ctype))
     if {one.kind, other.kind} == {"int", "bool"}:
         i = one if one.kind == "int" else other
         return replace(i, lo=min(i.lo, 0), hi=max(i.hi, 1))
@@ -279,6 +304,8 @@ class Notes:
     """Stores into a register with a range that only the declaration says they keep."""
     wraps: set[tuple[str, str]] = field(default_factory=set[tuple[str, str]])
     """Stores that may wrap, and sums and products that may go beyond 64 bits."""
+    promotions: set[tuple[str, str]] = field(default_factory=set[tuple[str, str]])
+    """Where a number of single precision meets one of double, and the result is one."""
     loops: set[tuple[str, str]] = field(default_factory=set[tuple[str, str]])
     """Loops with the bounds that are declared for them."""
     helpers: set[str] = field(default_factory=set[str])

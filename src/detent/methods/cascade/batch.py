@@ -78,9 +78,10 @@ def build_many(spec: CascadeSpec, columns: Mapping[str, Any], count: int) -> Any
     `columns` has the keys in which they differ, each of `COLUMNS`, as arrays of shape (count,), or one value for all;
     the result is an array of `CascadeParams`.
     """
-    made: Any = (CascadeParams * count)()
+    kind: Any = spec.registers_of(CascadeParams)
+    made: Any = (kind * count)()
     with np.errstate(all="ignore"):  # what a file would not be allowed to say is built, too, and refused elsewhere
-        fill_cascade(Columns(np.frombuffer(made, np.dtype(CascadeParams))), spec.varied(columns))
+        fill_cascade(Columns(np.frombuffer(made, np.dtype(kind))), spec.varied(columns))
     return made
 
 
@@ -229,7 +230,8 @@ class _Fleet:
         self.specs: Sequence[CascadeSpec] = specs
         self.whose, self.params = whose, params
         self.count = len(whose)
-        self.state: Any = (Cascade * self.count)()
+        self.kind: Any = specs[0].registers_of(Cascade)
+        self.state: Any = (self.kind * self.count)()
         self.seen: Any = (Seen * self.count)()
         self.reasons = dict[int, str]()
         self.p, self.r, self.s = (np.frombuffer(one, np.dtype(one._type_)) for one in (params, self.state, self.seen))
@@ -250,11 +252,11 @@ class _Fleet:
             if k in self.reasons:
                 continue
             if whose not in begun:
-                first: Any = Cascade()
+                first: Any = self.kind()
                 begun[whose] = first
                 switch_on(self.params[k], first, starts[whose])
                 first.controller.guarded = 1
-            ctypes.memmove(ctypes.addressof(self.state[k]), ctypes.addressof(begun[whose]), ctypes.sizeof(Cascade))
+            ctypes.memmove(ctypes.addressof(self.state[k]), ctypes.addressof(begun[whose]), ctypes.sizeof(self.kind))
 
     def groups(self) -> dict[tuple[int, float], Offsets]:
         """Axes that have one reference: those of one specification and sample period."""
@@ -361,7 +363,8 @@ class CascadeBatch:
 
     def _each(self, machine: Machine, count: int) -> _Fleet:
         """Axes built one by one."""
-        params, specs, refused = (CascadeParams * count)(), list[CascadeSpec](), dict[int, str]()
+        kind: Any = self.spec.registers_of(CascadeParams)
+        params, specs, refused = (kind * count)(), list[CascadeSpec](), dict[int, str]()
         for k in range(count):
             spec = self.spec
             try:

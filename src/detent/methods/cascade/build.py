@@ -33,7 +33,7 @@ STANDING = 0.02  # counts in a sample below which a measured velocity, as filter
 
 def build_cascade(spec: CascadeSpec) -> CascadeParams:
     """Parameters of the cascade axis."""
-    p = CascadeParams()
+    p = spec.registers_of(CascadeParams)()
     fill_cascade(p, spec)
     check_clocks(p)
     return p

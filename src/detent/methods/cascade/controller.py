@@ -24,7 +24,8 @@ from detent.control.guard import (
 )
 from detent.control.supervision import Supervision, SupervisionParams, supervise, warm_up
 from detent.kernel.loop import HostArray, controls, f8_signal
-from detent.kernel.registers import CONTROLLER, PLANT, Fit, Registers, block, f8, i8, register, u1
+from detent.kernel.registers import CONTROLLER, PLANT, Fit, Registers, block, f8, i8, real, register, single, u1
+from detent.kernel.single import alike
 from detent.kernel.step import hot_step, step
 from detent.sensing.home_marks import EndWires, HomeWires
 from detent.sensing.position_sensor import (
@@ -53,12 +54,12 @@ class FeedbackParams(Registers):
 class LimitParams(Registers):
     """What the guard compares with."""
 
-    following_error: f8 = register("largest magnitude of the position error", unit="m")
+    following_error: real = register("largest magnitude of the position error", unit="m")
     lowest: f8 = register("lower end of the travel, with the window", unit="m")
     highest: f8 = register("upper end of the travel, with the window", unit="m")
     place_on_load: u1 = register("ends of the travel: 0 encoder of the motor, 1 of the load", option=True)
-    breaking: f8 = register("magnitude of the command that breaks the axis loose", unit="V")
-    window: f8 = register("position in-position window", unit="m")
+    breaking: real = register("magnitude of the command that breaks the axis loose", unit="V")
+    window: real = register("position in-position window", unit="m")
     arrival: i8 = register("samples in the window until the axis is in position", unit="count")
 
 
@@ -79,8 +80,8 @@ class CascadeControllerParams(Registers):
 class Peaks(Registers):
     """Largest magnitudes since the host cleared them."""
 
-    following: f8 = register("position error", unit="m")
-    command: f8 = register("command", unit="V")
+    following: real = register("position error", unit="m")
+    command: real = register("command", unit="V")
     limited: i8 = register("samples with the command at its limit", unit="count")
 
 
@@ -253,7 +254,7 @@ def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> 
     Against a brake that still opens an effort may be at its limit, and move nothing.
     """
     error = abs(c.law.position_error)
-    late = (not error <= p.limits.following_error) + (not error <= 2.0 * p.limits.following_error)
+    late = (not error <= p.limits.following_error) + (not error <= 2 * p.limits.following_error)
     pushing, held = 0, is_closed(p.brake, c.brake)
     if abs(c.law.command) >= p.limits.breaking and not held:
         pushing = 1 if c.law.command > 0.0 else -1
@@ -301,21 +302,22 @@ def sample(
     c.samples += 1
     read_word(p.motor_sensor, c.motor_sensor, lines.motor)
     read_word(p.load_sensor, c.load_sensor, lines.load)
-    output = 0.0
+    output = alike(c.law.command, 0)
     if c.on and len(command) > 0:
-        output = command[c.entry] if c.entry < len(command) else 0.0
+        output = alike(c.law.command, command[c.entry]) if c.entry < len(command) else alike(c.law.command, 0)
         c.entry += 1
     elif c.on:
         refer(c, position, velocity, acceleration)
         output = decide(p, c)
         note_peaks(c)
         if c.guarded:
-            lost, apart = lines.motor.lost | lines.load.lost, c.motor_sensor.position - c.load_sensor.position
+            lost = lines.motor.lost | lines.load.lost
+            apart = alike(p.supervision.slip, c.motor_sensor.position - c.load_sensor.position)
             lower, upper, error = lines.ends.lower, lines.ends.upper, c.law.position_error
             supervise(p.supervision, c.supervision, p.guard, c.guard, lost, apart, lower, upper, error)
             # A word that is none is no jump: until the next one the motor goes on as it did.
             look_after(p, c, c.count + c.weighing.moved if lines.motor.lost else lines.motor.count)
-            output = output if c.on else 0.0
+            output = output if c.on else alike(output, 0)
     warm_up(p.supervision, c.supervision, output)
     lines.enable, lines.command = 1 if c.on else 0, output
     if p.brake.present:
@@ -331,11 +333,12 @@ def fit(p: CascadeControllerParams) -> Fit:
     sensors = p.motor_sensor, p.load_sensor
     delay, span = (max(getattr(one, name) for one in sensors) for name in ("delay", "span"))
     places = min(1 << (delay + span).bit_length(), MEMORY)
-    unused, kind = MEMORY - places, PositionSensorParams
+    unused, kind = MEMORY - places, type(p.motor_sensor)
+    state = PositionSensor if kind is PositionSensorParams else single(PositionSensor)
     return Fit(
-        {(PositionSensor, "memory"): places},
+        {(state, "memory"): places},
         {
-            (PositionSensor, "place"): (0, places - 1), (kind, "unused"): (unused, unused),
+            (state, "place"): (0, places - 1), (kind, "unused"): (unused, unused),
             (kind, "delay"): (0, max(0, places - 1 - span)), (kind, "span"): (1, max(1, span)),
         },
         {(kind, "unused"): unused},

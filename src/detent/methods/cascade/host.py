@@ -28,7 +28,8 @@ class RotaryCascade(Cascade):
     @classmethod
     def leaves(cls, prefix: str = "", offset: int = 0, by: str = "") -> Iterator[Leaf]:
         """Every stored quantity with its dotted path, in order of memory."""
-        return (replace(leaf, unit=rotary_unit(leaf.unit)) for leaf in Cascade.leaves(prefix, offset, by))
+        straight: Any = cls.__base__  # in single precision that is another class
+        return (replace(leaf, unit=rotary_unit(leaf.unit)) for leaf in straight.leaves(prefix, offset, by))
 
 
 def rotary_unit(unit: str) -> str:
@@ -39,7 +40,7 @@ def rotary_unit(unit: str) -> str:
 
 def cascade_registers(spec: CascadeSpec) -> type[Registers]:
     """Class of the registers of an axis, with its units."""
-    return RotaryCascade if spec.axis.motion == "rotary" else Cascade
+    return spec.registers_of(RotaryCascade if spec.axis.motion == "rotary" else Cascade)
 
 
 @step
@@ -65,7 +66,7 @@ class CascadeHost:
         self.spec = spec
         # ctypes gives every register its type at run time only.
         self.params: Any = build_cascade(spec)
-        self.state: Any = Cascade()
+        self.state: Any = spec.registers_of(Cascade)()
         self.controller: Any = self.state.controller
         start = spec.mechanics.start_position if position is None else position
         self.tick: float = self.params.plant.machine.period
@@ -109,7 +110,7 @@ class CascadeHost:
     def _advance(self, p: CascadeParams, r: Cascade, ticks: int, *recording: Any) -> int:
         if self._seen is None:
             return advance(p, r, ticks, *recording, *self.feed)
-        return advance_watched(p, r, ticks, *recording, self._seen, _PICKS, *self.feed)
+        return advance_watched(p, r, ticks, *recording, self._seen, self._picks, *self.feed)
 
     def pass_samples(self, samples: int) -> int:
         """Let samples pass, at most to the end of the one that makes an event; which one, 0 if none did."""
@@ -127,10 +128,14 @@ class CascadeHost:
     def watch(self, samples: int) -> Rows:
         """Let samples pass, and see every one of them."""
         first = self.state.tick // self.sample_ticks + 1
-        memory = self._seen = np.zeros((samples + 1, len(_PICKS)), np.uint8)
+        leaves = choose_leaves(self.spec.registers_of(Cascade), WATCHED)
+        self._picks = byte_places(leaves)
+        memory = self._seen = np.zeros((samples + 1, len(self._picks)), np.uint8)
         self.pass_samples(samples)
         self._seen = None
-        return memory[np.arange(first, first + samples) % len(memory)].view(_ROW)[:, 0]
+        return memory[np.arange(first, first + samples) % len(memory)].view(
+            [(leaf.path, "<" + leaf.width.code) for leaf in leaves]
+        )[:, 0]
 
 
 WATCHED = (
@@ -139,7 +144,3 @@ WATCHED = (
     "plant.machine.current", "plant.machine.motor.position", "plant.machine.load.position",
 )  # fmt: skip
 """Registers that `watch` shows."""
-
-_LEAVES = choose_leaves(Cascade, WATCHED)
-_PICKS = byte_places(_LEAVES)
-_ROW: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in _LEAVES])

@@ -133,9 +133,9 @@ def led(spec: CascadeSpec, operation: Callable[..., OperationParams], mode: str)
     """What leads at power-on, the drive off, to be operated."""
     lines, host = led_wiring(spec, mode), CascadeHost(spec)
     made: Any = live_of(host, operation)
-    state: Any = LedCascade(controller=host.controller)
+    state: Any = spec.registers_of(LedCascade)(controller=host.controller)
     host.controller = state.controller  # of which a fault is told
-    params: Any = LedParams(controller=host.params.controller, on_velocity=int(mode == "velocity"))
+    params: Any = spec.registers_of(LedParams)(controller=host.params.controller, on_velocity=int(mode == "velocity"))
     if spec.brake is not None:
         params.controller.brake.open += LATE
         state.controller.brake.left = params.controller.brake.open

@@ -73,6 +73,7 @@ class CascadeLiveParams(Registers):
 
     operation: OperationParams = block("times and limits")
     look_ticks: i8 = register("ticks between two looks", unit="tick")
+    period: f8 = register("time between two samples", unit="s")
     course: CourseLimits = block("what a motion may do")
     homing: HomingParams = block("how it finds its reference")
     settled: f8 = register("position error that counts as in position", unit="m")
@@ -168,8 +169,9 @@ def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Ope
 
 
 @step
-def go_along(
-    p: CascadeControllerParams, c: CascadeController, memory: CascadeLive, here: PositionSensor, s: Stream
+def go_along(  # noqa: PLR0913 - as `serve`
+    q: CascadeLiveParams, p: CascadeControllerParams, c: CascadeController, memory: CascadeLive, here: PositionSensor,
+    s: Stream,
 ) -> int:  # fmt: skip
     """One sample along a stream; gives why it goes on no longer, 0 while it does."""
     limits, course, period, rate = memory.limits, memory.course, p.law.period, 0.0
@@ -204,9 +206,9 @@ def serve(  # noqa: PLR0913 - as all of its kind
     if c.on == 0 or before == 0:  # the commanded point is where the axis is
         begin_at(course, here.position)
     if o.demand.do == FOLLOW and a.refused == 0:
-        a.refused = go_along(p, c, memory, here, o.stream)
+        a.refused = go_along(q, p, c, memory, here, o.stream)
     else:
-        advance(memory.limits, course, p.law.period)
+        advance(memory.limits, course, q.period)
         c.reference.acceleration = course.acceleration
     c.reference.position, c.reference.velocity = course.position, course.velocity
     a.position, a.velocity = here.position, here.velocity
@@ -233,7 +235,7 @@ def live_of(host: CascadeHost, operation: Callable[..., OperationParams]) -> Liv
     spec, limits = host.spec, motion_limits(host.spec)
     rest_off(host.params, host.state)
     host.params.controller.guard.softly = SOFT
-    q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
+    q, memory = CascadeLiveParams(look_ticks=host.sample_ticks, period=host.period), CascadeLive()
     q.settled = host.params.controller.limits.window
     ends = spec.limits.lowest, spec.highest
     motions = MOVE_TO, MOVE_BY, JOG, *STREAMS, *(() if spec.home is None else (HOME,))

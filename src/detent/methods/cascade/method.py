@@ -55,6 +55,10 @@ class CascadeMethod(Method[CascadeSpec]):
     reports = "page:cascade_page"
     says = "{job}: every move was in position on {axis}.", "Not done: {failure}"
 
+    def arithmetic(self, spec: CascadeSpec) -> str:
+        """As its file says."""
+        return spec.controller.arithmetic
+
     def tick(self, spec: CascadeSpec) -> float:
         """As many in a sample as the plant needs [s]."""
         return self.brought("build:build_cascade")(spec).plant.machine.period

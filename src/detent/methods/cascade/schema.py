@@ -5,7 +5,7 @@ for N and kg*m^2 for kg (`axisfile.motion`): a mass is then a moment of inertia,
 """
 
 import math
-from typing import Literal
+from typing import Literal, TypeVar
 
 from pydantic import Field
 
@@ -45,6 +45,9 @@ from detent.files.quantities import (
     VoltagePerLengthTime,
     VoltagePerVelocity,
 )
+from detent.kernel.registers import Registers, single
+
+R = TypeVar("R", bound=Registers)
 
 MOST_SAMPLES = 63  # samples that the memory of an encoder or of the amplifier reaches back (`sensing.position_sensor`)
 
@@ -300,6 +303,14 @@ class MethodTable(Table, frozen=True):
     feed_forward: FeedForwardTable = Field(default_factory=FeedForwardTable)
 
 
+class ControllerTable(Table, frozen=True):
+    """What the controller computes in."""
+
+    arithmetic: Literal["double", "single"] = optional(
+        "precision of the loops and of what watches them; positions are double in both", "double"
+    )
+
+
 class CascadeProtectionTable(MotionProtectionTable, frozen=True):
     """What ends a motion that is not what was asked for; a time or a length of 0 switches its watch off."""
 
@@ -341,11 +352,16 @@ class CascadeSpec(AxisSpec, frozen=True):
     encoder: EncoderTable
     load_encoder: EncoderTable | None = None
     method: MethodTable = Field(default_factory=MethodTable)
+    controller: ControllerTable = Field(default_factory=ControllerTable)
     protection: CascadeProtectionTable = Field(default_factory=CascadeProtectionTable)
     home: HomeTable | None = None
     limit_switches: LimitSwitchTable | None = None
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
     hardware: HardwareTable | None = None
+
+    def registers_of(self, declared: type[R]) -> type[R]:
+        """A class of registers as this axis has it, in the arithmetic of its controller."""
+        return single(declared) if self.controller.arithmetic == "single" else declared
 
     def unit(self, linear: str) -> str:
         """Unit of a quantity of this axis, by that of a linear axis: ``spec.unit("N")`` is ``"N*m"`` if it turns."""

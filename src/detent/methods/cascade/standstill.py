@@ -98,7 +98,8 @@ class CascadeEnsemble(Ensemble):
 
     def __init__(self, spec: CascadeSpec) -> None:
         self.spec, self.unit, self.grain = spec, spec.unit("m"), grain(spec)
-        self.params: Any = build_cascade(spec)
+        # In doubles whatever the controller computes in: a leap over hours of creeping relies on equal increments.
+        self.params: Any = build_cascade(spec.changed(controller={"arithmetic": "double"}))
         plant = self.params.plant
         plant.push.force, plant.home.present, plant.stop.side = 0.0, 0, 0.0
         self.count = spec.encoder_of("position").resolution

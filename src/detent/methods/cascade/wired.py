@@ -107,9 +107,9 @@ def wired(
         return {"": led(spec, operation, mode)}
     host, lines = CascadeHost(spec), wiring(spec)
     live = live_of(host, operation)
-    state = WiredCascade(controller=host.controller, lines=host.state.lines)
+    state = spec.registers_of(WiredCascade)(controller=host.controller, lines=host.state.lines)
     host.controller = state.controller  # of which a fault is told
-    params = WiredCascadeParams(controller=host.params.controller)
+    params = spec.registers_of(WiredCascadeParams)(controller=host.params.controller)
     return {"": (replace(live, params=params, state=state), lines)}
 
 

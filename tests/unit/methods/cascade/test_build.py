@@ -104,6 +104,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "method.derivative": ("90 V*s/m", PID),
     "method.derivative_filter": ("1 ms", PID),
     "method.dead_band": ("20 um", ()),
+    "controller.arithmetic": ("single", ()),
     "method.feedback.position": ("load", ("load_encoder.resolution=2 um",)),
     "method.feedback.velocity": ("load", ("load_encoder.resolution=2 um",)),
     "method.feed_forward.velocity": ("0.5", ()),

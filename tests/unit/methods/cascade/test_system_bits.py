@@ -8,7 +8,18 @@ import sys
 import numba
 import numpy as np
 import pytest
-from tests.cascade_rig import MASS, NO_TRACE, SAMPLE_TICKS, STANDING, T_SAMPLE, TICK, Rig, make_params, set_friction
+from tests.cascade_rig import (
+    MASS,
+    NO_TRACE,
+    SAMPLE_TICKS,
+    STANDING,
+    T_SAMPLE,
+    TICK,
+    Rig,
+    in_single,
+    make_params,
+    set_friction,
+)
 from tests.places import ROOT
 
 from detent.kernel.loop import advance
@@ -53,11 +64,20 @@ def noisy_params(variant: str) -> CascadeParams:
 
 
 VARIANTS = ("rigid", "coupled", "backlash", "brake")
+WHOLE = (*VARIANTS, *(f"{one} single" for one in VARIANTS))
+"""And each in single precision."""
+
+
+def axis_of(variant: str) -> Rig:
+    """An axis at power-on."""
+    name, _, precision = variant.partition(" ")
+    p = noisy_params(name)
+    return Rig(in_single(p) if precision else p)
 
 
 def run_hash(variant: str) -> str:
     """Hash of parameters and state along a move, a standing reference, and commands of the host."""
-    rig = Rig(noisy_params(variant))
+    rig = axis_of(variant)
     digest = hashlib.sha256(rig.p.snapshot())
     move = plan_move(0.0, 0.004, MOVE, T_SAMPLE)
     rows = np.zeros((7, len(rig.r.snapshot())), np.uint8)
@@ -82,31 +102,29 @@ def run_hash(variant: str) -> str:
 
 
 def test_it_is_determined():
-    for variant in VARIANTS:
+    for variant in WHOLE:
         assert run_hash(variant) == run_hash(variant)
 
 
 @pytest.mark.process
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="compares with compiled code; NUMBA_DISABLE_JIT is set")
 def test_plain_python_gives_the_same_bytes_as_compiled_code():
-    program = (
-        "from tests.unit.methods.cascade.test_system_bits import VARIANTS, run_hash; print(*map(run_hash, VARIANTS))"
-    )
+    program = "from tests.unit.methods.cascade.test_system_bits import WHOLE, run_hash; print(*map(run_hash, WHOLE))"
     environment = os.environ | {"PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}", "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(
         [sys.executable, "-c", program], env=environment, cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     found = done.stdout.split()
-    assert len(set(found)) == len(VARIANTS)
-    assert found == [run_hash(variant) for variant in VARIANTS]
+    assert len(set(found)) == len(WHOLE)
+    assert found == [run_hash(variant) for variant in WHOLE]
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("variant", WHOLE)
 def test_time_may_be_cut_anywhere(variant):
     move = plan_move(0.0, 0.01, MOVE, T_SAMPLE)
     feed = along(move.position, move.velocity, move.acceleration)
-    whole, pieces = Rig(noisy_params(variant)), Rig(noisy_params(variant))
+    whole, pieces = axis_of(variant), axis_of(variant)
     assert advance(whole.p, whole.r, 6000, *NO_TRACE, *feed) == 6000
     for ticks in (1, 2, 997, 3, 4000, 997):
         assert advance(pieces.p, pieces.r, ticks, *NO_TRACE, *feed) == ticks
