@@ -18,6 +18,7 @@ from numba.core import types as untyped_types
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult as UntypedCompileResult
 from numba.core.compiler_lock import global_compiler_lock as untyped_compiler_lock
+from numba.core.runtime.nrt import rtsys as untyped_rtsys
 
 import detent.kernel.compiled  # noqa: F401  # pyright: ignore[reportUnusedImport] - registers numba's types
 from detent.kernel.cache import compiled_folder, keep, read_kept, step_sources, tell_compiling
@@ -30,6 +31,7 @@ CompileResult: Any = UntypedCompileResult
 serialize: Any = untyped_serialize
 sigutils: Any = untyped_sigutils
 global_compiler_lock: Any = untyped_compiler_lock
+rtsys: Any = untyped_rtsys
 
 F = TypeVar("F", bound=Callable[..., Any])
 Act = Callable[..., Any]  # lets a host do something to its controller: ``act(action, *args)`` is ``action(*args)``
@@ -47,7 +49,8 @@ class _Kept(NullCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was kept for these types; None if nothing was, or if it is not kept."""
-        target_context.refresh()  # as numba's own cache does: it may not be ready yet
+        # Machine code needs what counts references; what compiling needs, which loads slowly, it fetches by itself.
+        rtsys.initialize(target_context)
         file, why = self._file(sig, target_context.codegen())
         kept = read_kept(file) if file else None
         if kept is None:
