@@ -43,7 +43,7 @@ from detent.identify.fit.verdict import (
     look_at_windows,
     missed,
 )
-from detent.identify.fit.windows import moved_by_windows
+from detent.identify.fit.windows import moved_by_windows, widened
 from detent.logs.log import Log
 
 Report = Callable[[str, float], None]
@@ -188,7 +188,9 @@ def identify(
     if method != "output error" and all(r.constants for r in judged):
         refused = {name for r in judged for name in r.constants}
         left = [name for name in constants.names if name not in refused]
-        judged += look_at_windows(runs[0], moved_by_windows(parts, own, left))
+        moved = moved_by_windows(parts, own, left)
+        judged += look_at_windows(runs[0], [one for one in moved if not one.is_slight])
+        tested = tested._replace(constants=widened(tested.constants, moved))
     if method == "auto" and [r.subject for r in judged if not r.constants] == [FAR_OFF]:
         tested = _other_way(runs, tested, fit, chosen_rung(climbs), report)
     constants, horizons = tested.constants, tested.horizons

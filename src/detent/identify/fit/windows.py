@@ -9,12 +9,14 @@ right, and not where it is wrong.
 """
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from detent.identify.fit import equations, regression
-from detent.identify.fit.constants import constants_of
+from detent.identify.fit.constants import Constants, constants_of
 
 WIDER = 1.5  # width of the other windows, in those of the fit
+SLIGHT = 0.003  # change over the constant up to which it matters to nobody, and widens the interval
 MOVED = 0.75  # change of a constant, in half of its interval, up to which noise explains it
 FEWEST = 3  # windows for each column, at least
 COMPARED = ("mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
@@ -27,6 +29,11 @@ class Moved(NamedTuple):
     value: float  # by the windows of the fit
     other: float  # by the wider ones
     width: float  # of the windows of the fit [s]
+
+    @property
+    def is_slight(self) -> bool:
+        """True where the change is less than anybody needs to know the constant to."""
+        return abs(self.other - self.value) <= SLIGHT * abs(self.value)
 
 
 def moved_by_windows(parts: Sequence[regression.Prepared], fit: regression.Fit, names: Collection[str]) -> list[Moved]:
@@ -48,3 +55,12 @@ def moved_by_windows(parts: Sequence[regression.Prepared], fit: regression.Fit, 
         if name in names and name in own.names and halves.get(name, 0.0) > 0.0
     ]
     return [one for far, one in sorted(found, reverse=True) if far > MOVED]
+
+
+def widened(constants: Constants, moved: Sequence[Moved]) -> Constants:
+    """Constants whose intervals carry by how much windows move them."""
+    covariance = constants.covariance.copy()
+    for one in moved:
+        k = constants.names.index(one.name)
+        covariance[k, k] += (one.other - one.value) ** 2
+    return replace(constants, covariance=covariance)

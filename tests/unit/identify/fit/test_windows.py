@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from tests.log_rig import make_log
 
+from detent.identify.fit.constants import constants_of
 from detent.identify.fit.equations import make_run
 from detent.identify.fit.identification import choose_windows, identify
 from detent.identify.fit.regression import fit_equations
-from detent.identify.fit.windows import MOVED, moved_by_windows
+from detent.identify.fit.windows import MOVED, Moved, moved_by_windows, widened
 
 T = np.arange(16000) * 1e-3
 TERMS = ("mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
@@ -48,3 +49,15 @@ def test_it_is_refused_with_both_values():
     assert not refusal.constants
     assert identify([log()]).verdict == "trusted"
     assert MOVED < 1.0  # an interval whose end another window reaches holds nothing
+
+
+def test_a_slight_change_widens_the_interval():
+    """A model that lacks next to nothing, of a log without noise: the mass is known to 0.1 %, not to 0.01 %."""
+    parts = choose_windows([make_run(log())])
+    constants = constants_of(fit_equations(parts, TERMS))
+    mass, error = constants.value("mass"), float(constants.errors[0])
+    slight = Moved("mass", mass, 1.001 * mass, 0.04)
+    assert slight.is_slight
+    assert not Moved("mass", mass, 1.004 * mass, 0.04).is_slight
+    assert widened(constants, [slight]).errors[0] == pytest.approx(np.hypot(error, 1e-3 * mass))
+    assert widened(constants, []).errors[0] == error
