@@ -189,7 +189,7 @@ def identify(
         refused = {name for r in judged for name in r.constants}
         left = [name for name in constants.names if name not in refused]
         moved = moved_by_windows(parts, own, left)
-        judged += look_at_windows(runs[0], [one for one in moved if not one.is_slight])
+        judged += look_at_windows(runs[0], [one for one in moved if not one.is_slight], left)
         tested = tested._replace(constants=widened(tested.constants, moved))
     if method == "auto" and [r.subject for r in judged if not r.constants] == [FAR_OFF]:
         tested = _other_way(runs, tested, fit, chosen_rung(climbs), report)

@@ -275,14 +275,13 @@ def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequ
         yield Refusal("model does not explain the log", text, record)
 
 
-def look_at_windows(run: Run, moved: Sequence[Moved]) -> Iterator[Refusal]:
+def look_at_windows(run: Run, moved: Sequence[Moved], names: Collection[str]) -> Iterator[Refusal]:
     """Whether wider windows say the same: an axis that is another for each length is none that the model has."""
-    if moved:
-        one, unit = moved[0], run.unit(moved[0].name)
+    for one in moved:
         widths = f"{one.value:.4g} by windows of {1e3 * one.width:.3g} ms, {one.other:.4g} by wider ones"
-        text = f"{one.name} [{unit}] depends on the window: {widths}; the model, or a signal, lacks something"
+        text = f"{one.name} [{run.unit(one.name)}] is {widths}: the model, or a signal, lacks something"
         record = "look for a sensor that is not even, a coupling that slips, spikes, a filter, a load put on"
-        yield Refusal("depends on the window", text, record)
+        yield Refusal("depends on the window", text, record, tuple(name for name in one.concerned if name in names))
 
 
 def level_of(effort: Values) -> float:

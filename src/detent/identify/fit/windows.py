@@ -1,8 +1,8 @@
 """Whether a constant is the same by wider windows: what a model lacks shows at one length more than at another.
 
-Noise, which both windows average, moves a constant by a part of its interval: on 115 simulated logs with nothing wrong
-by 0.1 of half of it as a rule, and by 0.7 at most, 520 constants in all. A sensor that is not even, a coupling that
-slips, spikes, a load put on and a filter are another axis for each length of the window.
+Noise, which both windows average, moves a constant by a part of its interval: on simulated logs with nothing wrong by a
+tenth of half of it as a rule, and by more than three quarters of the wider half in one of a hundred. A sensor that is
+not even, a coupling that slips, spikes, a load put on and a filter are another axis for each length of the window.
 
 Hausman: Specification tests in econometrics. Econometrica 46 (1978), 1251: two estimates that agree where the model is
 right, and not where it is wrong.
@@ -17,7 +17,7 @@ from detent.identify.fit.constants import Constants, constants_of
 
 WIDER = 1.5  # width of the other windows, in those of the fit
 SLIGHT = 0.003  # change over the constant up to which it matters to nobody, and widens the interval
-MOVED = 0.75  # change of a constant, in half of its interval, up to which noise explains it
+MOVED = 0.75  # change of a constant, in half of the wider of both intervals, up to which noise explains it
 FEWEST = 3  # windows for each column, at least
 COMPARED = ("mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
 
@@ -29,6 +29,13 @@ class Moved(NamedTuple):
     value: float  # by the windows of the fit
     other: float  # by the wider ones
     width: float  # of the windows of the fit [s]
+
+    @property
+    def concerned(self) -> tuple[str, ...]:
+        """Itself, the other friction of its direction, whose errors go with its own, and the delay."""
+        kind, _, way = self.name.partition(".")
+        partner = (f"{'viscous' if kind == 'coulomb' else 'coulomb'}.{way}",) if way else ()
+        return (self.name, *partner, "delay")
 
     @property
     def is_slight(self) -> bool:
@@ -44,7 +51,8 @@ def moved_by_windows(parts: Sequence[regression.Prepared], fit: regression.Fit, 
         return []
     run, own = parts[0].run, constants_of(fit)
     other = constants_of(regression.fit_equations(wider, fit.model, fit.bend))
-    halves = {e.name: e.half for e in own.estimates(run)}
+    by_other = {e.name: e.half for e in other.estimates(run)}
+    halves = {e.name: max(e.half, by_other.get(e.name, 0.0)) for e in own.estimates(run)}
     width = 2.0 * parts[0].motion.kernel.half * run.step
     found = [
         (

@@ -41,14 +41,21 @@ def test_a_sensor_that_is_not_even_moves_them():
     assert first not in {one.name for one in moved(log(wave=3e-5), [name for name in TERMS if name != first])[1]}
 
 
-def test_it_is_refused_with_both_values():
+def test_what_they_move_is_refused_with_both_values():
     found = identify([log(wave=3e-5)])
-    assert found.verdict == "refused"
-    (refusal,) = [r for r in found.refusals if r.subject == "depends on the window"]
-    assert "by wider ones" in refusal.text
-    assert not refusal.constants
+    assert found.verdict != "trusted"
+    refused = [r for r in found.refusals if r.subject == "depends on the window"]
+    assert all("by wider ones" in r.text for r in refused)
+    assert "mass" in {name for r in refused for name in r.constants}
+    assert "mass" not in {e.name for e in found.trusted}
     assert identify([log()]).verdict == "trusted"
     assert MOVED < 1.0  # an interval whose end another window reaches holds nothing
+
+
+def test_friction_takes_that_of_its_direction_along():
+    assert Moved("coulomb.positive", 1.0, 2.0, 0.04).concerned == ("coulomb.positive", "viscous.positive", "delay")
+    assert Moved("viscous.negative", 1.0, 2.0, 0.04).concerned == ("viscous.negative", "coulomb.negative", "delay")
+    assert Moved("mass", 1.0, 2.0, 0.04).concerned == ("mass", "delay")
 
 
 def test_a_slight_change_widens_the_interval():
