@@ -128,6 +128,7 @@ def _compile_parts(made: Any) -> None:
     template_of_types, compile_one, add_overload = made.get_call_template, made.compile, made.add_overload
 
     def template(args: Any, kws: Any) -> Any:
+        """For another step."""
         plain = {name: types.unliteral(kind) for name, kind in kws.items()}
         with global_compiler_lock:
             made.targetoptions["no_cpython_wrapper"] = True
@@ -137,6 +138,7 @@ def _compile_parts(made: Any) -> None:
                 del made.targetoptions["no_cpython_wrapper"]
 
     def compile_for(signature: Any) -> Any:
+        """For whoever calls."""
         with global_compiler_lock:
             kinds, _ = sigutils.normalize_signature(signature)
             for_steps = "no_cpython_wrapper" in made.targetoptions
@@ -146,6 +148,7 @@ def _compile_parts(made: Any) -> None:
             return compile_one(signature)
 
     def add(result: Any) -> None:
+        """Where its callers find it."""
         if is_part(result.library):
             made.overloads[tuple(result.signature.args)] = result  # Python must not find it
             return

@@ -195,7 +195,7 @@ _BLOCK = 4096  # rows at a time, which a processor holds
 def median_of_nine(values: Values) -> Values:
     """Median of nine samples about each, shape (n,); the signal keeps its end values beyond its ends.
 
-    >>> median_of_nine(np.r_[np.zeros(6), 9.0, 9.0, np.zeros(6)]).max()
+    >>> float(median_of_nine(np.r_[np.zeros(6), 9.0, 9.0, np.zeros(6)]).max())
     0.0
     """
     # SciPy's image package does the same, and takes longer to load than most logs to identify.
