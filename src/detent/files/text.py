@@ -54,7 +54,10 @@ def lines_of(text: str) -> list[str]:
     >>> lines_of("a\u2028b\r\nc\n")
     ['a\u2028b', 'c']
     """
-    return [line.removesuffix("\r") for line in text.removesuffix("\n").split("\n")] if text else []
+    if not text:
+        return []
+    lines = text.removesuffix("\n").split("\n")
+    return [line.removesuffix("\r") for line in lines] if "\r" in text else lines
 
 
 def short(text: str) -> str:

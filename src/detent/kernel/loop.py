@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.kernel.compiled import byte_at, copy_back, local_copy, put_byte
+from detent.kernel.parts import StepCompiler
 from detent.kernel.registers import Registers, Width, declared_of
 from detent.kernel.step import hot_step, step
 
@@ -27,6 +28,8 @@ extending: Any = numba.extending  # it publishes no types
 HostArray = Any  # a ctypes array; compiled code reads ``array[k]`` and ``len(array)``
 f8_signal = Annotated[Any, Width("f8", ctypes.c_double, "double")]  # one of float64, as a controller's step takes it
 i2_signal = Annotated[Any, Width("i2", ctypes.c_int16, "int16_t")]
+_AS_PART = {"pipeline_class": StepCompiler}
+_INLINED = {**_AS_PART, "forceinline": True}
 _TICKS: dict[type[Registers], tuple[Callable[..., Any], str]] = {}
 
 _SERVES: dict[type[Registers], Callable[..., Any]] = {}
@@ -104,7 +107,7 @@ def run_serve(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operatio
     _SERVES[declared_of(type(q))](q, p, controller, lines, memory, operation, *feed)
 
 
-@extending.overload(run_serve, jit_options={"forceinline": True})
+@extending.overload(run_serve, jit_options=_INLINED)
 def _run_serve(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operation: Any, *feed: Any) -> Any:  # noqa: ARG001, PLR0913 - as above
     serve = _SERVES[declared_of(q.registers)]
 
@@ -120,7 +123,7 @@ def run_controller(p: Any, controller: Any, lines: Any, *feed: Any) -> None:
     _CONTROLS[declared_of(type(p))](p, controller, lines, *feed)
 
 
-@extending.overload(run_controller, jit_options={"forceinline": True})
+@extending.overload(run_controller, jit_options=_INLINED)
 def _run_controller(p: Any, controller: Any, lines: Any, *feed: Any) -> Any:  # noqa: ARG001 - numba hands over all types
     control = _CONTROLS[declared_of(p.registers)]
 
@@ -141,7 +144,7 @@ def run_stretch(p: Any, r: Any, most: int, *feed: Any) -> int:
     return n
 
 
-@extending.overload(run_stretch, jit_options={"forceinline": True})
+@extending.overload(run_stretch, jit_options=_INLINED)
 def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 - numba hands over the types of all
     tick, local = _TICKS[declared_of(p.registers)]
     outer, _, inner = local.partition(".")
@@ -175,7 +178,7 @@ def run_disturbed(p: Any, r: Any, f: Any, most: int, *feed: Any) -> int:
     return n
 
 
-@extending.overload(run_disturbed)
+@extending.overload(run_disturbed, jit_options=_AS_PART)
 def _run_disturbed(p: Any, r: Any, f: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 - as above
     tick: Any = _DISTURBS.get(declared_of(p.registers))
 

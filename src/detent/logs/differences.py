@@ -170,8 +170,43 @@ def equal_runs(values: Values, fewest: int) -> NDArray[np.int64]:
 
 def spread(values: Values, rows: int) -> Values:
     """Largest less smallest value in the window of some rows about each sample, shape (n,)."""
-    images = scipy("ndimage")
-    return np.asarray(images.maximum_filter1d(values, rows) - images.minimum_filter1d(values, rows), dtype=np.float64)
+    padded = np.pad(values, (rows // 2, rows - 1 - rows // 2), mode="edge")
+    return _over_windows(np.maximum, padded, rows) - _over_windows(np.minimum, padded, rows)
+
+
+def _over_windows(of_two: np.ufunc, values: Values, rows: int) -> Values:
+    """The largest or smallest value of each window of some rows: of windows twice as wide as those before."""
+    wide = 1
+    while 2 * wide <= rows:
+        values = of_two(values[:-wide], values[wide:])
+        wide *= 2
+    left = rows - wide
+    return np.asarray(of_two(values[: len(values) - left], values[left:]), np.float64)
+
+
+# Exchanges, larger value behind, after which the fifth of nine is their median (Devillard: Fast median search, 1998).
+_NINE = (
+    (1, 2), (4, 5), (7, 8), (0, 1), (3, 4), (6, 7), (1, 2), (4, 5), (7, 8), (0, 3),
+    (5, 8), (4, 7), (3, 6), (1, 4), (2, 5), (4, 7), (4, 2), (6, 4), (4, 2),
+)  # fmt: skip
+_BLOCK = 4096  # rows at a time, which a processor holds
+
+
+def median_of_nine(values: Values) -> Values:
+    """Median of nine samples about each, shape (n,); the signal keeps its end values beyond its ends.
+
+    >>> float(median_of_nine(np.r_[np.zeros(6), 9.0, 9.0, np.zeros(6)]).max())
+    0.0
+    """
+    # SciPy's image package does the same, and takes longer to load than most logs to identify.
+    padded, found = np.pad(values, 4, mode="edge"), np.empty(len(values))
+    for first in range(0, len(values), _BLOCK):
+        block = padded[first : first + _BLOCK + 8]
+        row = [block[k : len(block) - 8 + k] for k in range(9)]
+        for low, high in _NINE:
+            row[low], row[high] = np.minimum(row[low], row[high]), np.maximum(row[low], row[high])
+        found[first : first + _BLOCK] = row[4]
+    return found
 
 
 def fill_holes(mask: NDArray[np.bool_], rows: int) -> NDArray[np.bool_]:

@@ -64,6 +64,9 @@ _MARKS = {
 _ANY = frozenset({"actual", "measured", "measured motor"})
 """Names that fit every measured signal: they say position where nothing else in a heading says more."""
 
+_LAST = frozenset({"cur", "curr"})
+"""Names that say something else before other words: motor cur is a current, cur pos the position of now."""
+
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+|[^\W\d_a-zA-Z]+")
 _SAID_AS = {
     "time": "zeit zeitpunkt tiempo temps tempo 时间 時間 时刻",
@@ -206,7 +209,8 @@ ROLES: dict[str, Role] = {
         Role("acceleration", "acceleration as measured", _MOTION[2], ("acceleration", "accel", "acc", "qdd", "ddq")),
         Role("force", "force of the drive on the axis", ("N",), ("motor force", "force", "thrust")),
         Role("torque", "torque of the motor", ("N*m",), ("motor torque", "torque", "tau", "moment")),
-        Role("current", "current of the motor", ("A",), ("motor current", "current", "iq", "i q", "amps", "i")),
+        Role("current", "current of the motor", ("A",),
+             ("motor current", "current", "iq", "i q", "amps", "cur", "curr", "i")),
         Role("supply", "voltage that supplies the drive", ("V",),
              ("supply", "supply voltage", "bus voltage", "vbus", "v bus", "dc link", "input volts", "input voltage",
               "battery", "vin")),
@@ -281,6 +285,8 @@ def _means_other(words: tuple[str, ...], known: str, role: str) -> bool:
     """True where other words of a name say that it is something else, as in target velocity."""
     others = set(words) - set(words_of(known))
     if any(others & marks for meant, marks in _MARKS.items() if role != meant):
+        return True
+    if known in _LAST and known != next(word for word in reversed(words) if not word.isdigit()):
         return True
     asked = {"target", "goal", "reference", "ref", "desired", "setpoint", "demand", "demanded", "commanded"}
     return role in {"position", "velocity", "acceleration", "current", "force", "torque"} and bool(others & asked)

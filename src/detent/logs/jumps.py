@@ -8,7 +8,7 @@ an effort, which may jump, only what leaves all that it is otherwise, or falls t
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.logs.differences import grain, runs_of, scipy
+from detent.logs.differences import grain, median_of_nine, runs_of
 from detent.logs.headings import EFFORTS
 from detent.logs.log import Action, Draft, Kind, Severity, Values, tell_count
 
@@ -52,13 +52,13 @@ def _ways(draft: Draft, role: str) -> tuple[Values, Values]:
     """Way of each row to the next, for a usual row, and the usual one around it."""
     steps = np.diff(draft.t)
     ways = np.diff(draft.values[role]) * (float(np.median(steps)) / steps)
-    return ways, np.asarray(scipy("ndimage").median_filter(ways, AROUND, mode="nearest"), np.float64)
+    return ways, median_of_nine(ways)
 
 
 def _find_lost_rows(draft: Draft, role: str) -> bool:
     """Find ways that are none, or whole multiples of those around, while the clock says that no row is missing."""
     ways, usual = _ways(draft, role)
-    spread = np.asarray(scipy("ndimage").median_filter(np.abs(ways - usual), AROUND, mode="nearest"), np.float64)
+    spread = median_of_nine(np.abs(ways - usual))
     size = np.abs(usual)
     least = max(CLEAR * grain(draft.values[role]), QUICK * float(np.quantile(size, 0.98)))
     tells = (size > least) & (spread < EVEN * size)

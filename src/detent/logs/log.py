@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from detent.errors import InputError
 from detent.files.screen import OnScreen
-from detent.logs.headings import EFFORTS
+from detent.files.text import short
+from detent.logs.headings import EFFORTS, ROLES, split_heading
 
 Values = NDArray[np.float64]  # numbers of a signal, shape (n,)
 Rows = NDArray[np.int64]  # numbers of rows of a file, from 1, header lines not counted, shape (n,)
 # What no instrument shows: a cell beyond it says nothing, one below it says 0. Squares of squares of what is computed
 # from it stay numbers.
 LARGEST, SMALLEST = 1e30, 1e-30
+MOST_NAMED = 6  # columns named in a sentence
 MOST_RANGES = 5  # stretches of rows named in a sentence; the finding itself holds all
 
 
@@ -120,6 +122,7 @@ class Log(OnScreen):
     constants: dict[str, float | str] = field(default_factory=dict[str, float | str])
     # rows of the file at which tests begin that a column tells apart, with what it says of each
     tests: tuple[tuple[int, str], ...] = ()
+    unread: tuple[str, ...] = ()  # columns of the file that were taken for no signal
 
     def __len__(self) -> int:
         return len(self.t)
@@ -143,19 +146,28 @@ class Log(OnScreen):
         for role in roles:
             if role not in self.signals:
                 allowed = f"a recording with {' and '.join(roles)}"
-                raise InputError.of_file(self.name, self._held(), allowed, f"name the column: {role}=COLUMN [UNIT]")
+                raise InputError.of_file(self.name, self._held(), allowed, f"name the column: {self._named(role)}")
 
     def effort(self, asked: str = "") -> str:
         """Role of the signal that drives the axis: as asked for, or the nearest to its mechanics that there is."""
         found = [role for role in EFFORTS if role in self.signals]
         if not found or (asked and asked not in found):
             allowed = f"{asked or 'something'} that drives the axis, one of {', '.join(EFFORTS)}"
-            remedy = f"name its column: {asked or 'force'}=COLUMN [UNIT]"
+            remedy = f"name its column: {self._named(asked or 'force')}"
             raise InputError.of_file(self.name, self._held(), allowed, remedy)
         return asked or found[0]
 
     def _held(self) -> str:
         return f"signals {', '.join(self.signals)}"
+
+    def _named(self, role: str) -> str:
+        """What states the column of a signal; a line to paste where a column of the file was taken for none."""
+        first, *others = self.unread or ("",)
+        if not first:
+            return f"{role}=COLUMN [UNIT]"
+        more = f", or one of {', '.join(map(short, others[:MOST_NAMED]))}" if others else ""
+        unit = "" if split_heading(first)[1] else f" [{ROLES[role].units[0]}]".replace(" []", "")
+        return f"--column '{role}={short(first)}{unit}'{more}"
 
     def to_dict(self) -> dict[str, Any]:
         """What was read, as plain data for JSON: everything but the numbers."""

@@ -2,6 +2,7 @@
 
 import csv
 import re
+from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -58,12 +59,14 @@ def read_csv(path: Path, options: FileOptions) -> RawTable:
     table = RawTable(str(path))
     text = decode(path, read_bytes(path, MAX_BYTES, ALLOWED), table)
     lines = lines_of(text if "\n" in text else text.replace("\r", "\n"))  # old programs end a line in CR alone
+    is_quoted = '"' in text
+    del text  # as large as the file
     try:
         lines = _unquoted(table, lines)
         layout = guess_layout(table, lines, options)
-        numbers = [index for index in range(layout.first, len(lines)) if is_telling(lines[index])]
+        numbers = array("q", (index for index in range(layout.first, len(lines)) if is_telling(lines[index])))
         check_size(table.file, len(numbers), len(layout.names))
-        _read_rows(table, layout, lines, numbers)
+        _read_rows(table, layout, _blocks(layout, lines, numbers, is_quoted=is_quoted))
     except csv.Error as error:
         got = f"ambiguous cells ({error})"
         raise InputError.of_file(table.file, got, ALLOWED, "remove the quotation marks, or state separator=") from None
@@ -92,7 +95,7 @@ def decode(path: Path, data: bytes, table: RawTable) -> str:
 
 def _unquoted(table: RawTable, lines: list[str]) -> list[str]:
     """Lines without the one pair of quotation marks around each that a spreadsheet leaves which took rows for cells."""
-    sample = [line for line in lines if is_telling(line)][:SAMPLE_LINES]
+    sample = list(islice(filter(is_telling, lines), SAMPLE_LINES))
     if not sample or not all(line[0] == line.rstrip()[-1] == '"' for line in sample):
         return lines
     if any(len(cells) != 1 for separator in "\t;,|" for cells in csv.reader(sample, delimiter=separator)):
@@ -104,41 +107,89 @@ def _unquoted(table: RawTable, lines: list[str]) -> list[str]:
     return ["".join(cells) for cells in inside]
 
 
-def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: list[int]) -> None:
-    """Read all rows, a block at a time, into the columns and the broken rows."""
-    cells = split_lines((lines[index] for index in numbers), layout.separator)
+Block = list[list[str]] | NDArray[np.float64]  # rows of cells; or of numbers, where all cells are
+
+
+def _blocks(layout: CsvLayout, lines: list[str], numbers: Sequence[int], *, is_quoted: bool) -> Iterator[Block]:
+    """The rows, a block at a time; what is quoted may go on in the next line."""
+    if is_quoted:
+        cells = split_lines((lines[index] for index in numbers), layout.separator)
+        while block := list(islice(cells, BLOCK_ROWS)):
+            yield block
+        return
+    for first in range(0, len(numbers), BLOCK_ROWS):
+        places = numbers[first : first + BLOCK_ROWS]
+        told = [lines[index] for index in places]
+        found = _all_numbers(layout, told)
+        if found is None:
+            yield list(split_lines(told, layout.separator))
+            continue
+        for index in places:  # none of them is broken, so nobody asks for its text any more
+            lines[index] = ""
+        yield found
+
+
+def _all_numbers(layout: CsvLayout, lines: list[str]) -> NDArray[np.float64] | None:
+    """Numbers of lines that hold nothing else, as `read_column` would read them; None where one does."""
+    separator, width = layout.separator, len(layout.names)
+    if separator == " " or layout.decimal != "." or layout.text_columns or layout.moment_columns:
+        return None
+    if any(line.count(separator) != width - 1 for line in lines):
+        return None
+    try:
+        found = np.array(separator.join(lines).split(separator), np.float64).reshape(len(lines), width)
+    except ValueError:
+        return None
+    return None if np.any(np.all(np.abs(found) > LARGEST_EXACT, axis=0)) else found
+
+
+def _read_rows(table: RawTable, layout: CsvLayout, blocks: Iterable[Block]) -> None:
+    """Read all rows into the columns and the broken rows."""
     columns = [index for index in range(len(layout.names)) if index not in layout.text_columns]
     pieces: dict[int, list[NDArray[np.generic]]] = {index: [] for index in columns}
     rows: list[NDArray[np.int64]] = []
     texts: dict[int, list[Change]] = {index: [] for index in sorted(layout.text_columns)}
     first = 1
-    while block := list(islice(cells, BLOCK_ROWS)):
-        fitting = _sort_out(table, layout, block, first)
-        found: list[NDArray[np.generic]] = []
-        wrong: dict[int, str] = {}  # of each row that holds no number where it should, the first such cell
-        across = list(zip(*(block[row] for row in fitting), strict=True)) or [()] * len(layout.names)
-        for index in columns:
-            column = across[index]
-            dated = index in layout.moment_columns
-            values, bad = read_moments(column) if dated else read_column(column, layout.decimal)
-            found.append(values)
-            wrong = {fitting[place]: column[place] for place in bad} | wrong
-        for row, cell in wrong.items():
-            _break(table, layout, block[row], first + row, f'"{short(cell)}" is no number')
-        keep = np.array([row not in wrong for row in fitting], dtype=np.bool_)
-        for index, values in zip(columns, found, strict=True):
-            pieces[index].append(values[keep])
-        for index, said in texts.items():
-            said.extend(changes_of(across[index], [row + first for row in fitting], said[-1][1] if said else None))
-        rows.append(np.array(fitting, dtype=np.int64)[keep] + first)
+    for block in blocks:
+        if isinstance(block, np.ndarray):
+            for index in columns:
+                pieces[index].append(block[:, index].copy())
+            rows.append(np.arange(first, first + len(block)))
+        else:
+            fitting, keep, across = _read_cells(table, layout, block, first, pieces)
+            for index, said in texts.items():
+                said.extend(changes_of(across[index], [row + first for row in fitting], said[-1][1] if said else None))
+            rows.append(np.array(fitting, dtype=np.int64)[keep] + first)
         first += len(block)
     table.rows = np.concatenate(rows) if rows else table.rows
     for index in columns:
-        table.add(Item(layout.names[index], np.concatenate(pieces[index]), layout.units[index]))
+        table.add(Item(layout.names[index], np.concatenate(pieces.pop(index)), layout.units[index]))
     table.broken.sort()
     table.words = {layout.names[index]: said for index, said in texts.items() if len(said) <= MOST_TESTS}
     words = [short(layout.names[index]) for index in sorted(layout.text_columns)]
     table.notes += [f"text columns skipped: {', '.join(words)}"] if words else []
+
+
+def _read_cells(
+    table: RawTable, layout: CsvLayout, block: list[list[str]], first: int, pieces: dict[int, list[NDArray[np.generic]]]
+) -> tuple[list[int], NDArray[np.bool_], list[tuple[str, ...]]]:
+    """Read rows of cells into pieces of the columns; rows as wide as the header, which of them hold numbers, cells."""
+    fitting = _sort_out(table, layout, block, first)
+    found: dict[int, NDArray[np.generic]] = {}
+    wrong: dict[int, str] = {}  # of each row that holds no number where it should, the first such cell
+    across = list(zip(*(block[row] for row in fitting), strict=True)) or [()] * len(layout.names)
+    for index in pieces:
+        column = across[index]
+        dated = index in layout.moment_columns
+        values, bad = read_moments(column) if dated else read_column(column, layout.decimal)
+        found[index] = values
+        wrong = {fitting[place]: column[place] for place in bad} | wrong
+    for row, cell in wrong.items():
+        _break(table, layout, block[row], first + row, f'"{short(cell)}" is no number')
+    keep = np.array([row not in wrong for row in fitting], dtype=np.bool_)
+    for index, values in found.items():
+        pieces[index].append(values[keep])
+    return fitting, keep, across
 
 
 def _sort_out(table: RawTable, layout: CsvLayout, block: list[list[str]], first: int) -> list[int]:
@@ -217,7 +268,7 @@ def read_moments(cells: Sequence[str]) -> tuple[NDArray[np.datetime64], set[int]
 
 def is_telling(line: str) -> bool:
     """True for a line that is neither empty nor a comment."""
-    return bool(line.strip()) and not _COMMENT.match(line)
+    return line[:1].isdigit() or (bool(line.strip()) and not _COMMENT.match(line))
 
 
 def split_lines(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
@@ -236,7 +287,7 @@ def guess_layout(table: RawTable, lines: Sequence[str], options: FileOptions) ->
     or the line before that where it holds nothing but units.
     """
     begin = options.header or 0
-    sample = [index for index in range(begin, len(lines)) if is_telling(lines[index])][:SAMPLE_LINES]
+    sample = list(islice((index for index in range(begin, len(lines)) if is_telling(lines[index])), SAMPLE_LINES))
     separator = options.separator or _guess_separator([lines[index] for index in sample])
     rows = list(split_lines([lines[index] for index in sample], separator))
     width = _width(rows)

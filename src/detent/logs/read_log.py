@@ -58,13 +58,14 @@ def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None
     draft = make_draft(table, chosen, stated)
     if "time" in chosen:
         draft.tests = find_tests(table, chosen["time"], list(chosen.values()))
+    left = tuple(name for name in table.columns if name not in chosen.values())
     table.columns = {}  # the draft has what was chosen of them
     if not draft.values:
         raise InputError.of_file(str(path), _nothing_left(draft), "at least one signal", "state what the columns are")
     clean(draft)
     if not draft.values:
         raise InputError.of_file(str(path), _nothing_left(draft), "at least one signal", "record the signals again")
-    return _finish(Path(path).name, table, draft)
+    return replace(_finish(Path(path).name, table, draft), unread=left)
 
 
 def read_table(path: str | Path, options: FileOptions | None = None, *, apart: bool = False) -> RawTable:

@@ -12,6 +12,7 @@ from detent.logs.differences import (
     grain,
     integral,
     likeness,
+    median_of_nine,
     paired_changes,
     parabolas,
     products_of,
@@ -130,3 +131,12 @@ def test_a_part_of_a_long_recording_tells_its_resolution() -> None:
     for step in (1e-3, 1e-6):
         values = np.where(t < 25.0, 0.0, np.round(np.sin(0.3 * (t - 25.0)) / step) * step)
         assert resolution(values) == pytest.approx(step, rel=1e-6)
+
+
+@pytest.mark.parametrize("count", [9, 10, 57, 4096, 4097, 9001])
+def test_medians_and_spreads_over_windows_are_those_of_image_filters(count):
+    values = np.random.default_rng(count).normal(size=count).round(1)
+    assert np.array_equal(median_of_nine(values), ndimage.median_filter(values, 9, mode="nearest"))
+    for rows in (1, 2, 3, 7, 8):
+        expected = ndimage.maximum_filter1d(values, rows) - ndimage.minimum_filter1d(values, rows)
+        assert np.array_equal(spread(values, rows), expected)

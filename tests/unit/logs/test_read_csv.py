@@ -270,3 +270,18 @@ def test_lines_of_old_programs_end_in_a_carriage_return_alone(write):
         "t [s]": [0, 1, 2],
         "x [mm]": [1, 2, 3],
     }
+
+
+def test_lines_of_nothing_but_numbers_say_the_same_as_cells_in_quotes(write, monkeypatch):
+    """Plain lines are read as one; a line with a word, too few cells or no value takes its block the other way."""
+    monkeypatch.setattr("detent.logs.read_csv.BLOCK_ROWS", 3)
+    whole = ["0,1.5,9007199254740993", "1, 2.5 ,9007199254740995", "2,-3e2,9007199254740997"]
+    lines = [*whole, "3,,4", "4,5,6", "5,word,7", "6,1", "7,2,3", "8,4,5"]
+    plain = read_csv(write("\n".join(["t,q,n", *lines])), FileOptions())
+    quoted = read_csv(write("\n".join(['"t",q,n', *lines])), FileOptions())
+    assert plain.columns.keys() == quoted.columns.keys() == {"t", "q", "n"}
+    for name, values in plain.columns.items():
+        np.testing.assert_array_equal(values, quoted.columns[name])
+    assert plain.broken == quoted.broken
+    assert [one.row for one in plain.broken] == [6, 7]
+    assert plain.rows.tolist() == quoted.rows.tolist() == [1, 2, 3, 4, 5, 8, 9]

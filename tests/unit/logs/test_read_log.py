@@ -141,3 +141,15 @@ def test_what_was_left_out_is_not_in_the_log(write):
     assert list(log.signals) == list(set(log.units) - {"time"}) == ["position"]
     (finding,) = log.findings
     assert (finding.action, finding.severity) == (Action.LEFT_OUT, Severity.WARNING)
+
+
+def test_a_refusal_names_the_columns_that_were_not_read(tmp_path):
+    path = tmp_path / "log.csv"
+    rows = "\n".join(f"{k},{k * k},{k % 3},{k % 5}" for k in range(30))
+    path.write_text(f"t [s],position [mm],AX:P17,probe [A]\n{rows}\n", encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_log(path, None, ("current=",)).effort("force")
+    assert "--column 'force=AX:P17 [N]', or one of probe [A]" in str(caught.value)
+    named = read_log(path, None, ("force=AX:P17 [N]", "current="))
+    assert named.effort() == "force"
+    assert named.unread == ("probe [A]",)

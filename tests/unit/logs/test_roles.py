@@ -16,7 +16,8 @@ from detent.logs.headings import ROLES, rank, split_heading, words_of
         ("acc", "acceleration"), ("force", "force"), ("motor torque", "torque"), ("tau", "torque"), ("i_q", "current"),
         ("MotorCurrent", "current"), ("u", "voltage"), ("input_volts", "supply"), ("Vbus", "supply"),
         ("load", "command"), ("pwm", "command"), ("inputSignal", "command"), ("controlSignal", "command"),
-        ("temp", "temperature"), ("torque_enable", "enabled"),
+        ("temp", "temperature"), ("torque_enable", "enabled"), ("AX:CUR", "current"), ("motor_curr1", "current"),
+        ("AX:RBV", "position"),
     ],
 )  # fmt: skip
 def test_names(name, role):
@@ -33,6 +34,7 @@ def test_names(name, role):
         ("target velocity", "velocity"), ("torque_enable", "torque"), ("iq_ref", "current"), ("velocity", "position"),
         ("extra", "position"), ("x2", "position"), ("vibration", "velocity"), ("Sample", "time"), ("", "time"),
         ("speed", "position"), ("commanded current", "current"), ("position_error", "position"),
+        ("cur_pos", "current"), ("curr speed", "current"),
     ],
 )  # fmt: skip
 def test_names_of_something_else(name, role):

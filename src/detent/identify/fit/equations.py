@@ -35,6 +35,7 @@ _MASS = {"N": "kg", "N*m": "kg*m^2"}
 Rows = NDArray[np.intp]  # numbers of samples
 _SHAPE = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** 4
 FINE, FINEST = 6e-3, 4  # half of the window that tells the direction [s], and its fewest samples
+BLOCK = 100_000  # samples of windows that are added up at a time
 NOISES = 5.0  # velocity that is told from standstill, in standard deviations of its noise
 HOPS = 2  # rows per half window
 LOST = 50.0  # exponent of the low-speed friction from which on it is left as it is: nothing
@@ -252,9 +253,14 @@ def _way_weights(weights: Values) -> Values:
 
 def _weighted(padded: Values, weights: Values, rows: Rows) -> Values:
     """Weighted sums of what begins at some samples."""
-    taken = np.lib.stride_tricks.sliding_window_view(padded, len(weights))[rows]
-    taken *= weights
-    return np.asarray(taken.sum(axis=1), np.float64)
+    # A few windows at a time, which a processor holds; they are added up the same way as all at once.
+    windows = np.lib.stride_tricks.sliding_window_view(padded, len(weights))
+    found, count = np.empty(len(rows)), max(BLOCK // len(weights), 1)
+    for first in range(0, len(rows), count):
+        taken = windows[rows[first : first + count]]
+        taken *= weights
+        taken.sum(axis=1, out=found[first : first + count])
+    return found
 
 
 # ---- the equation of motion

@@ -17,11 +17,10 @@ from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants, hanging_position
 from detent.identify.fit.equations import Run, fine_kernel, make_kernel
 from detent.identify.fit.estimate import quantile, rms, significant
-from detent.identify.fit.loop_fit import Loops, fit_loops
+from detent.identify.fit.loop_fit import Loops, fit_loops, motion_asked
 from detent.kernel.loop import advance
 from detent.logs.log import Values
 from detent.methods.cascade import system as cascade
-from detent.planning.profile import profile_of_recording
 from detent.plant.linear_two_mass import fastest_rate
 from detent.record.recorder import byte_places, choose_leaves
 from detent.sensing.position_sensor import MEMORY
@@ -280,11 +279,10 @@ def _follow(constants: Constants, loops: Loops, run: Run) -> tuple[Values, Value
     p, r = _params(constants, loops, run), cascade.Cascade()
     _start(p, r, loops, run)
     reference = run.reference if run.reference is not None else run.position
-    asked = profile_of_recording(run.t, reference, run.step)
     samples = len(run.position)
     rows = np.zeros((samples + 1, 16), np.uint8)
     every = p.controller.sample_ticks
-    feed = cascade.along(asked.position, asked.velocity, asked.acceleration)
+    feed = cascade.along(reference, *motion_asked(run, reference))
     advance(p, r, samples * every, rows, _LOOP_PICKS, every, *feed)
     table = rows.view(np.float64)
     return np.concatenate([run.position[:1], table[1:samples, 0]]), table[1 : samples + 1, 1].copy()

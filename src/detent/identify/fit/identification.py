@@ -40,8 +40,10 @@ from detent.identify.fit.verdict import (
     look_at_log,
     look_at_motion,
     look_at_prediction,
+    look_at_windows,
     missed,
 )
+from detent.identify.fit.windows import moved_by_windows, widened
 from detent.logs.log import Log
 
 Report = Callable[[str, float], None]
@@ -174,6 +176,7 @@ def identify(
         return Identification(tuple(logs), runs, None, (), (), None, (), tuple(refusals))
     climbs, fit, rivals = _fit_all(parts, runs, report)
     changes = changes_of(parts, fit)
+    own = replace(fit, covariance=fit.covariance.copy())
     widen(fit, changes)
     constants = constants_of(fit, rivals)
     refusals += look_at_fit(parts, fit, chosen_climb(climbs).error, changes)
@@ -182,6 +185,12 @@ def identify(
         tested = _simulated(runs, constants, fit, chosen_rung(climbs), method, report)
     refusals += tested.disagreement
     judged = _judge(runs, parts, climbs, tested, refusals)
+    if method != "output error" and all(r.constants for r in judged):
+        refused = {name for r in judged for name in r.constants}
+        left = [name for name in constants.names if name not in refused]
+        moved = moved_by_windows(parts, own, left)
+        judged += look_at_windows(runs[0], [one for one in moved if not one.is_slight], left)
+        tested = tested._replace(constants=widened(tested.constants, moved))
     if method == "auto" and [r.subject for r in judged if not r.constants] == [FAR_OFF]:
         tested = _other_way(runs, tested, fit, chosen_rung(climbs), report)
     constants, horizons = tested.constants, tested.horizons

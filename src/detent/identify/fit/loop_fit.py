@@ -50,6 +50,12 @@ class Loops:
     error: float  # effort not explained over the effort, in the part that was not fitted
 
 
+def motion_asked(run: Run, reference: Values) -> tuple[Values, Values]:
+    """Velocity and acceleration of a reference, as the feedforward that is found belongs to them."""
+    velocity = np.gradient(reference, run.step)
+    return velocity, np.gradient(velocity, run.step)
+
+
 def fit_loops(run: Run) -> Loops | None:
     """Find the loops that drove an axis; None without a reference, and where no such loops explain the effort."""
     if run.reference is None or len(run.position) < 10 * max(SPANS):
@@ -61,13 +67,13 @@ def fit_loops(run: Run) -> Loops | None:
 def _trials(run: Run, reference: Values) -> Iterator["_Trial"]:
     """Every structure that is tried, the simplest first."""
     step, count = run.step, len(reference)
-    velocity = np.gradient(reference, step)
+    velocity, acceleration = motion_asked(run, reference)
     rows = np.flatnonzero(run.usable)
     rows = rows[(rows >= max(SPANS) + 3) & (rows < count - 3)]
     rows = rows[:: max(1, len(rows) // MOST_ROWS)]
     if len(rows) < 10 * max(SPANS):
         return
-    feeds = [series[rows] for series in (np.gradient(velocity, step), velocity, np.sign(velocity), np.ones(count))]
+    feeds = [series[rows] for series in (acceleration, velocity, np.sign(velocity), np.ones(count))]
     for span in SPANS:
         moved = np.zeros(count)
         moved[span:] = (run.position[span:] - run.position[:-span]) / (span * step)

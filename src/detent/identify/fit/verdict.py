@@ -14,6 +14,7 @@ from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb, chosen_climb
 from detent.identify.fit.regression import Fit, Prepared, make_effort, residuals_of
 from detent.identify.fit.steadiness import SLIGHT, Change
+from detent.identify.fit.windows import Moved
 from detent.logs.differences import stepped
 from detent.logs.log import Action, Kind, Log, Severity, Values
 
@@ -27,12 +28,16 @@ WIDEST_FORCE = 0.15  # half of the interval of a friction or a weight over the e
 SAME_SPEED = 0.6  # tenth over ninth decile of the speeds of a direction, from which on they count as one speed
 WIDEST_DELAY = 10.0  # half of the interval of the delay, in samples, at most
 MOST_APART = 0.2  # what the delay does to the effort, over the effort, at most
+USUAL_DELAY = 3.0  # samples by which an effort may act later whatever that does to it: it is measured, worked out, held
 MOST_LATE = 2.5  # samples by which the effort may come after the motion that it causes
 COARSE = 0.1  # distance of the levels of an effort, in its size, from which it may say too little
 UNTOLD = 0.06  # residual in this distance from which it does: a command that is one of few levels is exact
+SLOWEST = 0.1  # share of the top speed from which an axis moves
+FEWEST_BESIDE = 20  # zeros in motion, and different values beside the gap about them, from which small ones are gone
 LASTING = 0.9  # correlation of neighbouring residuals from which the model misses something that lasts
 WORST_LASTING = 0.05  # error of the prediction from which that matters
-WORST_MISSED, WORST_FREE = 0.4, 0.8  # error of simulations over the travel: of half a second and more; of the free run
+# Error of simulations over the travel: of half a second and more, as a rule; of any of these, and of the free run.
+WORST_MISSED, WORST_ANY = 0.4, 0.8
 FAR_OFF = "simulation is far off"
 WELL_MET = 0.2  # the same up to which the simulation fit is recommended where the regression is far off
 BETTER_MISSED = 0.7  # such an error in that of another way to the constants, up to which it is the better one
@@ -92,6 +97,9 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
     if any(f.kind is Kind.REPEATED_STAMPS and f.action is Action.INTERPOLATED for f in log.findings):
         text = f"{log.name}: time stamps are coarser than the rows"
         yield Refusal("coarse time", text, "record the time of each row to a tenth of a period", ("delay",))
+    if gone := _small_values_gone(log.signals[run.effort_name], log.signals["position"]):
+        text = f"{log.name}: {run.effort_name} is never between 0 and {gone:.3g} {run.effort_unit}, and 0 in motion"
+        yield Refusal("small values are gone", text, "record the effort without a threshold below which it counts as 0")
     told = {"position", run.effort_name}
     stuck = float(log.mask(Kind.STUCK, signals=told).mean())
     if stuck > MOST_STUCK:
@@ -105,6 +113,17 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
     if saturated > MOST_SATURATED:
         text = f"{log.name}: {run.effort_name} or position is at its limit in {saturated:.0%} of the rows"
         yield Refusal("saturated", text, "record slower or smaller moves that stay within the limit")
+
+
+def _small_values_gone(effort: Values, position: Values) -> float:
+    """Smallest value of an effort whose small ones were all written as 0 while the axis moved; 0 where none were."""
+    # Of a continuous effort some values lie between 0 and any other: a gap as wide as its smallest value is, with many
+    # different ones as far again behind it, is no chance, and no step of a converter.
+    sizes, speed = np.abs(effort), np.abs(np.gradient(position))
+    least = float(np.min(sizes[sizes > 0.0], initial=np.inf))
+    zeros = np.count_nonzero((sizes == 0.0) & (speed > SLOWEST * float(np.quantile(speed, 0.98))))
+    behind = len(np.unique(sizes[(sizes >= least) & (sizes < 2.0 * least)]))
+    return least if min(zeros, behind) >= FEWEST_BESIDE else 0.0
 
 
 def _share_at_ends(run: Run, runs: Sequence[Run]) -> float:
@@ -237,7 +256,7 @@ def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequ
     if not fit.is_settled and (is_known or error > WORST_LASTING):
         text = f"up to {delay:.3g} ms, the end of the search, no delay of the effort fits the motion best"
         yield Refusal("delay out of range", text, record)
-    elif apart > MOST_APART:
+    elif apart > MOST_APART and not (is_known and delay + half > 0.0 and delay - half < USUAL_DELAY * step):
         text = f"{delay:.3g} ms between effort and motion, which is {apart:.0%} of the effort: a delay, or a filter"
         yield Refusal("effort and motion are apart", text, record)
     elif fit.instruments == "reference" and is_known and delay + half < -MOST_LATE * step:
@@ -254,6 +273,15 @@ def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequ
             "look for a filter, a coarse sensor, or friction that depends on the place; record on one axis at a time"
         )
         yield Refusal("model does not explain the log", text, record)
+
+
+def look_at_windows(run: Run, moved: Sequence[Moved], names: Collection[str]) -> Iterator[Refusal]:
+    """Whether wider windows say the same: an axis that is another for each length is none that the model has."""
+    for one in moved:
+        widths = f"{one.value:.4g} by windows of {1e3 * one.width:.3g} ms, {one.other:.4g} by wider ones"
+        text = f"{one.name} [{run.unit(one.name)}] is {widths}: the model, or a signal, lacks something"
+        record = "look for a sensor that is not even, a coupling that slips, spikes, a filter, a load put on"
+        yield Refusal("depends on the window", text, record, tuple(name for name in one.concerned if name in names))
 
 
 def level_of(effort: Values) -> float:
@@ -290,8 +318,7 @@ def look_at_prediction(
 
 def _far_off(horizons: Sequence[Horizon]) -> Iterator[Refusal]:
     """A simulation that leaves the log by more than constants that are nearly right can make it."""
-    off, free = missed(horizons), [h for h in horizons if h.name == "free run" and h.moved > 0.0]
-    if off > WORST_MISSED or any(h.rms > WORST_FREE * h.moved for h in free):
+    if missed(horizons) > WORST_MISSED or any(h.rms > WORST_ANY * h.moved for h in _long(horizons)):
         told = ", ".join(f"{h.rms / h.moved:.0%} over {h.name}" for h in _long(horizons))
         text = f"simulated from the effort alone, the axis misses its travel by {told}"
         record = "record each direction at several speeds; behind --method regression, try --method output-error"

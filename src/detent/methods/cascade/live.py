@@ -174,7 +174,7 @@ def go_along(  # noqa: PLR0913 - as `serve`
     s: Stream,
 ) -> int:  # fmt: skip
     """One sample along a stream; gives why it goes on no longer, 0 while it does."""
-    limits, course, period, rate = memory.limits, memory.course, p.law.period, 0.0
+    limits, course, period, rate = memory.limits, memory.course, q.period, 0.0
     if s.quantity == POSITION:
         rate = s.bend if follow(limits, course, s.value, s.slope, period) else 0.0
     elif s.quantity != EFFORT:

@@ -93,6 +93,17 @@ def test_a_stuck_signal_is_refused_beyond_five_per_cent(rows, refused):
     assert look(finding(Kind.STUCK, "temperature", [(1, 1000)])) == []
 
 
+def test_an_effort_whose_small_values_are_gone_is_refused():
+    """A threshold of the recorder; levels of a converter, and zeros of a drive that is off, are none."""
+    _, _, _, force = Recorder(seconds=2.0).columns()
+    least = 0.3 * float(np.sqrt(np.mean(force**2)))
+    (refusal,) = look(force=np.where(np.abs(force) < least, 0.0, force))
+    assert refusal.subject == "small values are gone"
+    assert look(force=least * np.round(force / least)) == []
+    off = np.where(np.arange(len(force)) < 0.02 * len(force), 0.0, force)
+    assert look(force=off) == []
+
+
 def test_a_position_that_stays_behind_its_reference_is_refused():
     log = log_with()
     reference = Recorder(seconds=2.0).columns()[1]
@@ -299,6 +310,8 @@ def test_a_simulation_far_off_its_travel_is_refused():
     for far in (
         [*near[:2], horizon("free run", 0.82, 1.0, 1.0)],
         [near[0], *(horizon(name, 0.5, 1.0, 1.0) for name in ("1 s", "2 s"))],
+        # One length alone may be off by 438 % where the others, and their median, are not.
+        [near[0], horizon("1 s", 0.1, 1.0, 1.0), horizon("2 s", 4.38, 1.0, 1.0), near[2]],
     ):
         (found,) = look_at_prediction([climb(0.1)], far, [])
         assert (found.subject, found.constants) == ("simulation is far off", ())

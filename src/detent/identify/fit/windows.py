@@ -1,0 +1,74 @@
+"""Whether a constant is the same by wider windows: what a model lacks shows at one length more than at another.
+
+Noise, which both windows average, moves a constant by a part of its interval: on simulated logs with nothing wrong by a
+tenth of half of it as a rule, and by more than three quarters of the wider half in one of a hundred. A sensor that is
+not even, a coupling that slips, spikes, a load put on and a filter are another axis for each length of the window.
+
+Hausman: Specification tests in econometrics. Econometrica 46 (1978), 1251: two estimates that agree where the model is
+right, and not where it is wrong.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from detent.identify.fit import equations, regression
+from detent.identify.fit.constants import Constants, constants_of
+
+WIDER = 1.5  # width of the other windows, in those of the fit
+SLIGHT = 0.003  # change over the constant up to which it matters to nobody, and widens the interval
+MOVED = 0.75  # change of a constant, in half of the wider of both intervals, up to which noise explains it
+FEWEST = 3  # windows for each column, at least
+COMPARED = ("mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
+
+
+class Moved(NamedTuple):
+    """A constant that depends on the window."""
+
+    name: str
+    value: float  # by the windows of the fit
+    other: float  # by the wider ones
+    width: float  # of the windows of the fit [s]
+
+    @property
+    def concerned(self) -> tuple[str, ...]:
+        """Itself, the other friction of its direction, whose errors go with its own, and the delay."""
+        kind, _, way = self.name.partition(".")
+        partner = (f"{'viscous' if kind == 'coulomb' else 'coulomb'}.{way}",) if way else ()
+        return (self.name, *partner, "delay")
+
+    @property
+    def is_slight(self) -> bool:
+        """True where the change is less than anybody needs to know the constant to."""
+        return abs(self.other - self.value) <= SLIGHT * abs(self.value)
+
+
+def moved_by_windows(parts: Sequence[regression.Prepared], fit: regression.Fit, names: Collection[str]) -> list[Moved]:
+    """Those of some constants that other windows move by more than noise does, the furthest moved first."""
+    kernels = [equations.make_kernel(round(WIDER * p.motion.kernel.half), p.run.step) for p in parts]
+    wider = [regression.prepare(p.run, kernel, p.instruments) for p, kernel in zip(parts, kernels, strict=True)]
+    if sum(len(p.motion.rows) for p in wider) < FEWEST * len(fit.names):
+        return []
+    run, own = parts[0].run, constants_of(fit)
+    other = constants_of(regression.fit_equations(wider, fit.model, fit.bend))
+    by_other = {e.name: e.half for e in other.estimates(run)}
+    halves = {e.name: max(e.half, by_other.get(e.name, 0.0)) for e in own.estimates(run)}
+    width = 2.0 * parts[0].motion.kernel.half * run.step
+    found = [
+        (
+            abs(other.value(name) - own.value(name)) / halves[name],
+            Moved(name, own.value(name), other.value(name), width),
+        )
+        for name in COMPARED
+        if name in names and name in own.names and halves.get(name, 0.0) > 0.0
+    ]
+    return [one for far, one in sorted(found, reverse=True) if far > MOVED]
+
+
+def widened(constants: Constants, moved: Sequence[Moved]) -> Constants:
+    """Constants whose intervals carry by how much windows move them."""
+    covariance = constants.covariance.copy()
+    for one in moved:
+        k = constants.names.index(one.name)
+        covariance[k, k] += (one.other - one.value) ** 2
+    return replace(constants, covariance=covariance)

@@ -1,0 +1,70 @@
+"""Constants that are others by wider windows are found; those that noise moves are not."""
+
+import numpy as np
+import pytest
+from tests.log_rig import make_log
+
+from detent.identify.fit.constants import constants_of
+from detent.identify.fit.equations import make_run
+from detent.identify.fit.identification import choose_windows, identify
+from detent.identify.fit.regression import fit_equations
+from detent.identify.fit.windows import MOVED, Moved, moved_by_windows, widened
+
+T = np.arange(16000) * 1e-3
+TERMS = ("mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
+
+
+def log(wave=0.0, seed=1):
+    """An axis of 2 kg, and a sensor whose error goes up and down every 2 mm."""
+    w = 2 * np.pi * np.array([0.23, 0.61, 1.3])
+    angle, sizes = np.outer(T, w) + np.array([0.3, 1.1, 2.0]), np.array([0.06, 0.025, 0.008])
+    x, v, a = np.sin(angle) @ sizes, np.cos(angle) @ (sizes * w), -np.sin(angle) @ (sizes * w**2)
+    force = 2.0 * a + 1.6 * np.sign(v) + 6.0 * v + 0.02 * np.random.default_rng(seed).normal(size=len(T))
+    return make_log(T, position=x + wave * np.sin(2 * np.pi * x / 2e-3), force=force)
+
+
+def moved(made, names=TERMS):
+    parts = choose_windows([make_run(made)])
+    return parts, moved_by_windows(parts, fit_equations(parts, TERMS), names)
+
+
+def test_noise_moves_no_constant():
+    assert [moved(log(seed=seed))[1] for seed in range(5)] == [[]] * 5
+
+
+def test_a_sensor_that_is_not_even_moves_them():
+    parts, found = moved(log(wave=3e-5))
+    assert found
+    assert found[0].width == pytest.approx(2 * parts[0].motion.kernel.half * 1e-3)
+    assert all(one.value != one.other for one in found)
+    first = found[0].name
+    assert first not in {one.name for one in moved(log(wave=3e-5), [name for name in TERMS if name != first])[1]}
+
+
+def test_what_they_move_is_refused_with_both_values():
+    found = identify([log(wave=3e-5)])
+    assert found.verdict != "trusted"
+    refused = [r for r in found.refusals if r.subject == "depends on the window"]
+    assert all("by wider ones" in r.text for r in refused)
+    assert "mass" in {name for r in refused for name in r.constants}
+    assert "mass" not in {e.name for e in found.trusted}
+    assert identify([log()]).verdict == "trusted"
+    assert MOVED < 1.0  # an interval whose end another window reaches holds nothing
+
+
+def test_friction_takes_that_of_its_direction_along():
+    assert Moved("coulomb.positive", 1.0, 2.0, 0.04).concerned == ("coulomb.positive", "viscous.positive", "delay")
+    assert Moved("viscous.negative", 1.0, 2.0, 0.04).concerned == ("viscous.negative", "coulomb.negative", "delay")
+    assert Moved("mass", 1.0, 2.0, 0.04).concerned == ("mass", "delay")
+
+
+def test_a_slight_change_widens_the_interval():
+    """A model that lacks next to nothing, of a log without noise: the mass is known to 0.1 %, not to 0.01 %."""
+    parts = choose_windows([make_run(log())])
+    constants = constants_of(fit_equations(parts, TERMS))
+    mass, error = constants.value("mass"), float(constants.errors[0])
+    slight = Moved("mass", mass, 1.001 * mass, 0.04)
+    assert slight.is_slight
+    assert not Moved("mass", mass, 1.004 * mass, 0.04).is_slight
+    assert widened(constants, [slight]).errors[0] == pytest.approx(np.hypot(error, 1e-3 * mass))
+    assert widened(constants, []).errors[0] == error
