@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -318,8 +319,8 @@ def look_at_prediction(
 
 def _far_off(horizons: Sequence[Horizon]) -> Iterator[Refusal]:
     """A simulation that leaves the log by more than constants that are nearly right can make it."""
-    if missed(horizons) > WORST_MISSED or any(h.rms > WORST_ANY * h.moved for h in _long(horizons)):
-        told = ", ".join(f"{h.rms / h.moved:.0%} over {h.name}" for h in _long(horizons))
+    if missed(horizons) > WORST_MISSED or any(share > WORST_ANY for _, share in shares_missed(horizons)):
+        told = ", ".join(f"{share:.0%} over {name}" for name, share in shares_missed(horizons))
         text = f"simulated from the effort alone, the axis misses its travel by {told}"
         record = "record each direction at several speeds; behind --method regression, try --method output-error"
         yield Refusal(FAR_OFF, text, record)
@@ -328,6 +329,16 @@ def _far_off(horizons: Sequence[Horizon]) -> Iterator[Refusal]:
 def _long(horizons: Sequence[Horizon]) -> list[Horizon]:
     """Horizons over which constants show: half a second and more."""
     return [h for h in horizons if h.name not in {"one step", "0.1 s"} and h.moved > 0.0]
+
+
+def shares_missed(horizons: Sequence[Horizon]) -> list[tuple[str, float]]:
+    """By how much simulations of each such length miss, over the travel.
+
+    An axis that comes back within a stretch has travelled as far as it did in a shorter one.
+    """
+    long = _long(horizons)
+    ways = accumulate((h.moved for h in long), max)
+    return [(h.name, h.rms / way) for h, way in zip(long, ways, strict=True)]
 
 
 def missed(horizons: Sequence[Horizon]) -> float:

@@ -16,7 +16,7 @@ from detent.identify.fit import equations, regression
 from detent.identify.fit.constants import Constants, constants_of
 
 WIDER = 1.5  # width of the other windows, in those of the fit
-SLIGHT = 0.003  # change over the constant up to which it matters to nobody, and widens the interval
+SLIGHT = 0.01  # change over the constant up to which it matters to nobody, and widens the interval
 MOVED = 0.75  # change of a constant, in half of the wider of both intervals, up to which noise explains it
 FEWEST = 3  # windows for each column, at least
 COMPARED = ("mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")

@@ -8,8 +8,9 @@ from tests.places import DATA
 from tests.trust.judge import write_csv
 from tests.trust.plants import make_case
 
+from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.identification import Identification, identify
-from detent.identify.fit.verdict import WORST_ANY, WORST_MISSED, missed
+from detent.identify.fit.verdict import WORST_ANY, WORST_MISSED, missed, shares_missed
 from detent.logs.read_log import read_log
 
 pytestmark = pytest.mark.compiled
@@ -30,8 +31,8 @@ def is_kept(found: Identification) -> bool:
     """True where all, or a mass, is trusted only beside a simulation that follows the log."""
     if not any(e.name == "mass" for e in found.trusted):
         return found.verdict != "trusted"
-    long = [h for h in found.horizons if h.name not in {"one step", "0.1 s"} and h.moved > 0.0]
-    return missed(found.horizons) <= WORST_MISSED and all(h.rms <= WORST_ANY * h.moved for h in long)
+    shares = shares_missed(found.horizons)
+    return missed(found.horizons) <= WORST_MISSED and all(share <= WORST_ANY for _, share in shares)
 
 
 def recordings() -> list[tuple[Path, tuple[str, ...]]]:
@@ -67,3 +68,10 @@ def test_an_effort_that_does_not_move_the_axis_so(spoil: Callable, tmp_path: Pat
     found = identify([read_log(path)])
     assert is_kept(found)
     assert found.verdict == "refused"
+
+
+def test_an_axis_that_comes_back_has_travelled():
+    """To and fro in a second: over two seconds it moves nowhere, and an error there is none of the travel."""
+    ways = {"0.1 s": 9.0, "0.5 s": 2.0, "1 s": 4.0, "2 s": 0.01}
+    horizons = [Horizon(1.0, name, 10, 0.1, 0.2, moved, 1.0) for name, moved in ways.items()]
+    assert shares_missed(horizons) == [("0.5 s", 0.05), ("1 s", 0.025), ("2 s", 0.025)]
