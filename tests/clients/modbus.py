@@ -88,9 +88,16 @@ elif what == "jog":
     for _ in range(25):
         heart()
         time.sleep(0.02)
-    found["velocity"] = sum(heart() and read(18, 2) for _ in range(10)) / 10  # one count in a sample is 1000 of it
+    seen = []
+    for _ in range(20):  # samples, fifty of which come in a second: a count more in one is 1000 of its velocity
+        heart()
+        seen.append(read(18, 2))
+        time.sleep(0.02)
+    found["velocity"] = sum(seen) / len(seen)
     command(3)
-    time.sleep(0.1)  # the commanded point rests at once, the load a little later
+    begin = time.monotonic()
+    while abs(read(18, 2)) >= 200 and time.monotonic() - begin < 1.0:
+        time.sleep(0.01)  # the commanded point rests at once, the load a little later
     found["after"] = read(18, 2)
 elif what == "leave moving":
     command(1)
