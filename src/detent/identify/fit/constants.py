@@ -8,12 +8,12 @@ inference", Biometrics 53 (1997)).
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from detent.identify.fit.equations import Run
-from detent.identify.fit.estimate import Estimate, estimate, significant
+from detent.identify.fit.estimate import Estimate, estimate, quantile, significant
 from detent.identify.fit.regression import Fit, Instruments
 from detent.logs.log import Values
 
@@ -118,6 +118,19 @@ def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Values, Values, Values]:
     # Two that cancel leave rounding, of either sign.
     values = [significant(v) if abs(v) > CANCELLED * p else 0.0 for v, p in zip(values, parts, strict=True)]
     return tuple(wanted), np.array(values), weights @ fit.covariance @ weights.T, degrees
+
+
+def reaching(constants: Constants, others: Constants) -> Constants:
+    """Constants whose intervals reach as far as those of another way to the same, which may lie elsewhere."""
+    known = {name: k for k, name in enumerate(others.names)}
+    covariance = constants.covariance.copy()
+    for k, name in enumerate(constants.names):
+        if (j := known.get(name)) is None:
+            continue
+        far = abs(float(others.values[j] - constants.values[k]))
+        far += quantile(float(others.degrees[j])) * float(others.errors[j])
+        covariance[k, k] = max(covariance[k, k], (far / quantile(float(constants.degrees[k]))) ** 2)
+    return replace(constants, covariance=covariance)
 
 
 def hanging_position(constants: Constants) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from detent.errors import DetentError, InputError
 from detent.files.screen import OnScreen
 from detent.identify.fit import untold
-from detent.identify.fit.constants import Constants, constants_of
+from detent.identify.fit.constants import Constants, constants_of, reaching
 from detent.identify.fit.equations import LOSS, Run, make_kernel, make_run
 from detent.identify.fit.estimate import Estimate, quantile
 from detent.identify.fit.free_run import ClosedLoop, Horizon, simulate_closed_loop, simulate_horizons
@@ -192,7 +192,10 @@ def identify(
         judged += look_at_windows(runs[0], [one for one in moved if not one.is_slight], left)
         tested = tested._replace(constants=widened(tested.constants, moved))
     if method == "auto" and [r.subject for r in judged if not r.constants] == [FAR_OFF]:
-        tested = _other_way(runs, tested, fit, chosen_rung(climbs), report)
+        other = _other_way(runs, tested, fit, chosen_rung(climbs), report)
+        if other.constants is not tested.constants:
+            judged = _judge(runs, parts, climbs, other, refusals)
+        tested = other
     constants, horizons = tested.constants, tested.horizons
     kernel, told = parts[0].motion.kernel, f"{runs[0].effort_name} [{runs[0].effort_unit}]"
     width = 2e3 * kernel.half * kernel.step
@@ -244,18 +247,21 @@ def _simulated(  # noqa: PLR0913 - all that a simulation consists of
 
 
 def _other_way(runs: Sequence[Run], tested: _Tested, fit: Fit, rung: Rung, report: Report) -> _Tested:
-    """The simulation fit beside a regression that does not predict the motion: which is better, and by how much."""
+    """The simulation fit in the place of a regression that does not predict the motion, where it predicts it."""
     # Axes that stick, lose force in a gear, or have a coarse encoder: the regression sees little of what holds them.
-    # Its constants are told of, not given: intervals of logs that no model predicts well miss the truth too often.
+    # Of logs that no model predicts well the limits of the simulation fit alone miss the truth too often: they reach as
+    # far as those of the regression.
     try:
-        seen, horizons, _ = _test_simulation(runs, fit, rung, "output error", report)
+        seen, horizons, closed = _test_simulation(runs, fit, rung, "output error", report)
+        refined = _refine(runs, tested.constants, "output error", report)
     except DetentError:  # too short for its stretches
         return tested
     other, by = missed(tested.horizons), missed(horizons)
     told = f"the regression misses held-out travel by {other:.0%}, the simulation fit by {by:.0%}"
-    if seen is not None and 0.0 < by < min(BETTER_MISSED * other, WELL_MET):
-        return tested._replace(believed=f"{told}: it predicts better, --method output-error gives its constants")
-    return tested._replace(believed=f"{told}: neither is to be believed")
+    if seen is None or not 0.0 < by < min(BETTER_MISSED * other, WELL_MET):
+        return tested._replace(believed=f"{told}: neither is to be believed")
+    believed = f"{told}: its constants are given, with intervals that hold those of both"
+    return _Tested(reaching(refined, tested.constants), seen, horizons, closed, believed, tested.disagreement)
 
 
 def _check_alike(runs: Sequence[Run]) -> None:
