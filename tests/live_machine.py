@@ -26,8 +26,14 @@ PLACES = st.floats(-0.125, 1.125, width=32)  # in parts of the travel
 SPEEDS = st.floats(-1.0, 1.0, width=32)  # in parts of the largest speed
 NO_NUMBERS = st.sampled_from((math.nan, math.inf, -math.inf, 1e300))
 MOTIONS = (ops.MOVE_TO, ops.MOVE_BY, ops.JOG, ops.HOME)
-OTHERS = tuple(kind for kind in ops.COMMANDS if kind not in MOTIONS)
-VALUES = {ops.TRUST: (0.0, 1.0, 2.0), ops.ORDER: tuple(map(float, range(7))), ops.GO: tuple(map(float, range(5)))}
+ENDING = tuple(kind for kind in ops.COMMANDS if kind not in ops.POINTS)  # commands, each of which has an ending
+OTHERS = tuple(kind for kind in ENDING if kind not in MOTIONS)
+STREAMED = dict.fromkeys(ops.STREAMS, (1e-3, 5e-3, 0.01, 0.1, 0.0))  # periods of interpolation [s]
+VALUES = STREAMED | {
+    ops.TRUST: (0.0, 1.0, 2.0),
+    ops.ORDER: tuple(map(float, range(7))),
+    ops.GO: tuple(map(float, range(5))),
+}
 
 
 class AxisMachine(RuleBasedStateMachine):
@@ -93,13 +99,33 @@ class AxisMachine(RuleBasedStateMachine):
             self.watch(1)
         self.watch(wait)
 
-    @rule(kind=st.sampled_from(ops.COMMANDS), value=NO_NUMBERS)
+    @rule(kind=st.sampled_from(ENDING), value=NO_NUMBERS)
     def ask_what_is_no_number(self, kind: int, value: float) -> None:
         """It is refused, except that a stop is a stop."""
         command = self.ask(kind, value)
         self.watch(1)
         if kind not in (ops.STOP, ops.OFF):
             assert self.host.ending(command) == Ending(command, ops.REFUSED, ops.NOT_FINITE, 0)
+
+    @rule(
+        kind=st.sampled_from(ops.POINTS), value=st.one_of(NO_NUMBERS, PLACES), of_another=st.booleans(),
+        number=st.integers(1, 20), client=st.sampled_from((1, 1, 1, 2)), wait=PERIODS,
+    )  # fmt: skip
+    def set_points(
+        self,
+        kind: int,
+        value: float,
+        of_another: bool,
+        number: int,
+        client: int,
+        wait: int,
+    ) -> None:
+        """Set-points of the stream that runs, or of none."""
+        for _ in range(number):
+            at = value * self.limits.travel if math.isfinite(value) else value
+            self.host.ask(kind, at, id=int(self.o.running) + of_another, client=client)
+            self.watch(1)
+        self.watch(wait)
 
     @rule(kind=st.sampled_from((ops.ENABLE, *MOTIONS)))
     def ask_of_an_old_epoch(self, kind: int) -> None:

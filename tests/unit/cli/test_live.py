@@ -92,7 +92,7 @@ def test_an_axis_is_asked_from_a_terminal(file: Path, served: Served) -> None:
 def test_the_selector_is_turned_from_a_terminal(file: Path, served: Served) -> None:
     assert call("connect", file, "selector", "remote").exit_code == 0
     refused = call("connect", file, "enable")
-    assert (refused.exit_code, "(114)" in refused.stderr) == (1, True)
+    assert (refused.exit_code, "(116)" in refused.stderr) == (1, True)
     assert "detent connect FILE selector both" in refused.stderr
     assert "only faces command" in call("connect", file).stdout
     assert call("connect", file, "stop").exit_code == 0
