@@ -15,6 +15,7 @@ from detent.control import operation as ops
 from detent.control.axis_states import ENABLED, FAULT, FAULT_REACTION, QUICK_STOP, SWITCH_ON_DISABLED
 from detent.control.deviation_counter import RUN
 from detent.control.guard import FOLLOWING
+from detent.control.stream import EFFORT
 from detent.operate.faults import injection_of, injections
 from detent.operate.host import Ending
 from tests.live_bench import Bench
@@ -62,6 +63,7 @@ class AxisMachine(RuleBasedStateMachine):
         self.before, self.speed = self.state, abs(self.a.velocity)
         self.state, self.running = int(self.o.state), int(self.o.running)
         self.trust, self.epoch = int(self.o.trust), int(self.o.epoch)
+        self.followed = self.o.demand.do == ops.FOLLOW
         self.seen, self.sought = self.course(), self.searches()
 
     def course(self) -> tuple[float, float, float]:
@@ -124,6 +126,20 @@ class AxisMachine(RuleBasedStateMachine):
         for _ in range(number):
             at = value * self.limits.travel if math.isfinite(value) else value
             self.host.ask(kind, at, id=int(self.o.running) + of_another, client=client)
+            self.watch(1)
+        self.watch(wait)
+
+    @precondition(lambda self: self.is_led())
+    @rule(kind=st.sampled_from(ops.STREAMS), share=SPEEDS, number=st.integers(1, 60), wait=PERIODS)
+    def lead(self, kind: int, share: float, number: int, wait: int) -> None:
+        """A stream, a set-point in every period; behind the last one it is lost, and comes to rest."""
+        for one in (ops.TAKE, ops.CONFIRM):
+            self.ask(one)
+        stream = self.ask(kind, self.period)
+        self.watch(1)
+        for _ in range(number):
+            at = self.a.commanded + share * self.limits.speed * self.period if kind == ops.STREAM_POSITION else share
+            self.host.ask(ops.POINT, at * (self.limits.speed if kind == ops.STREAM_VELOCITY else 1.0), id=stream)
             self.watch(1)
         self.watch(wait)
 
@@ -263,9 +279,14 @@ class AxisMachine(RuleBasedStateMachine):
         if not (state == self.state == ENABLED) or self.a.fault or self.searches() or self.sought:
             return
         x0, v0, a0 = self.seen
-        assert abs(x - x0) <= limits.speed * period * (1.0 + 1e-6) + 1e-12
-        assert abs(v - v0) <= limits.acceleration * period * (1.0 + 1e-6) + 1e-12
-        assert abs(a - a0) <= limits.jerk * period * (1.0 + 1e-6) + 1e-9
+        follows = self.followed or self.o.demand.do == ops.FOLLOW
+        # Set-points are somebody else's: between them the speed is limited, and the effort by the law. While an effort
+        # is followed, the commanded point is where the axis is.
+        if not (follows and (self.injected or self.o.stream.quantity == EFFORT)):
+            assert abs(x - x0) <= limits.speed * period * (1.0 + 1e-6) + 1e-12
+        if not follows:
+            assert abs(v - v0) <= limits.acceleration * period * (1.0 + 1e-6) + 1e-12
+            assert abs(a - a0) <= limits.jerk * period * (1.0 + 1e-6) + 1e-9
         if self.trust and self.o.trust:
             # Beyond an end it may stand, where nobody knew of the end; from there it only comes back.
             lowest, highest = min(0.0, x0), max(limits.travel, x0)
