@@ -55,15 +55,17 @@ class AxisMachine(RuleBasedStateMachine):
         self.asked: list[int] = []
         self.late = 0
         self.injected = False  # ever: then what its sensors say may be no truth
-        self.state = int(self.o.state)
+        self.state, self.speed = int(self.o.state), 0.0
         self.note()
 
     def note(self) -> None:
         """How it is, for the next look."""
-        self.before, self.speed = self.state, abs(self.a.velocity)
+        self.before = self.state
+        if self.o.state != ENABLED:  # how fast it coasts when it is enabled
+            self.speed = abs(self.a.velocity)
         self.state, self.running = int(self.o.state), int(self.o.running)
         self.trust, self.epoch = int(self.o.trust), int(self.o.epoch)
-        self.followed = self.o.demand.do == ops.FOLLOW
+        self.followed, self.kind = self.o.demand.do == ops.FOLLOW, int(self.o.kind)
         self.seen, self.sought = self.course(), self.searches()
 
     def course(self) -> tuple[float, float, float]:
@@ -261,7 +263,8 @@ class AxisMachine(RuleBasedStateMachine):
             assert o.running == 0
             assert o.fault or state != FAULT
         if state == self.state == ENABLED > self.before and o.running == 0:  # I9: where it is, is where it is to be
-            coasts = 3.0 * self.speed * self.period + 2.0 * self.bench.grain
+            # Where it was, and where it is, are whole counts of its sensor.
+            coasts = 3.0 * self.speed * self.period + 2.0 * max(self.bench.grain, self.host.sensor.scale)
             assert self.injected or abs(self.a.error) <= coasts
         if int(o.epoch) > self.epoch:  # I6: what was under way has ended
             assert o.running not in (0, self.running) or o.running == 0
@@ -279,15 +282,15 @@ class AxisMachine(RuleBasedStateMachine):
         if not (state == self.state == ENABLED) or self.a.fault or self.searches() or self.sought:
             return
         x0, v0, a0 = self.seen
-        follows = self.followed or self.o.demand.do == ops.FOLLOW
         # Set-points are somebody else's: between them the speed is limited, and the effort by the law. While an effort
-        # is followed, the commanded point is where the axis is.
-        if not (follows and (self.injected or self.o.stream.quantity == EFFORT)):
-            assert abs(x - x0) <= limits.speed * period * (1.0 + 1e-6) + 1e-12
-        if not follows:
+        # is followed, the commanded point is where the axis is, also where that is no longer allowed in the same look.
+        if ops.STREAM_EFFORT in (self.kind, self.o.kind) or (self.followed and self.o.stream.quantity == EFFORT):
+            return
+        assert abs(x - x0) <= limits.speed * period * (1.0 + 1e-6) + 1e-12
+        if not (self.followed or self.o.demand.do == ops.FOLLOW or self.kind in ops.STREAMS):
             assert abs(v - v0) <= limits.acceleration * period * (1.0 + 1e-6) + 1e-12
             assert abs(a - a0) <= limits.jerk * period * (1.0 + 1e-6) + 1e-9
-        if self.trust and self.o.trust:
+        if self.trust and self.o.trust and not (self.injected and self.o.stream.quantity == EFFORT):
             # Beyond an end it may stand, where nobody knew of the end; from there it only comes back.
             lowest, highest = min(0.0, x0), max(limits.travel, x0)
             assert lowest - 1e-9 <= x <= highest + 1e-9

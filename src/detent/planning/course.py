@@ -413,15 +413,21 @@ def begin_to_be_led(p: CourseLimits, c: Course) -> None:
 def drift(p: CourseLimits, c: Course, position: float, velocity: float, period: float) -> bool:
     """One sample of a course that is where the axis is; False where that goes too fast, or a stop would come too late.
 
-    It is reckoned with the velocity that a few samples more would bring, for a stop does not act at once.
+    It is reckoned with the velocity that a few samples more would bring, for a stop does not act at once. A course that
+    was planned stays where it is, and as it slows down, when it may not be left.
     """
     if not is_usable(p) or not -FARTHEST <= position <= FARTHEST:
         return False
+    is_planned, x, v, a = c.mode != LED, c.position, c.velocity, c.acceleration
     begin_to_be_led(p, c)
     gain = velocity - c.velocity
     soon = velocity + SOON * gain if gain * velocity > 0.0 else velocity
     c.position, c.velocity, c.acceleration = position, min(max(velocity, -p.speed), p.speed), 0.0
-    return abs(velocity) <= p.speed and not is_past(c.limits, position, position + soon * SOON * period, soon)
+    if abs(velocity) <= p.speed and not is_past(c.limits, position, position + soon * SOON * period, soon):
+        return True
+    if is_planned:
+        c.position, c.velocity, c.acceleration = x, v, a
+    return False
 
 
 @step

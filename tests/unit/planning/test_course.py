@@ -844,3 +844,11 @@ def test_a_course_drifts_with_its_axis_as_far_as_a_stop_allows(m):
         for nowhere in (nan, 2e9, -2e9):
             assert not m.drift(p, c, nowhere, 0.0, 1e-3)
         assert c.position == before
+
+
+def test_a_course_that_slows_down_goes_on_so_where_it_may_not_drift(m):
+    """It began anew at no deceleration, and led 0.4 mm beyond the end that its stop would have kept."""
+    c, p = at_rest(m, 0.5), ended(m)
+    c.mode, c.velocity, c.acceleration = m.STOP, 0.9, -3.0
+    assert not m.drift(p, c, 0.9, 0.9, 1e-3)
+    assert state(c) == (0.5, 0.9, -3.0)

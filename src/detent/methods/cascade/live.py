@@ -182,6 +182,9 @@ def go_along(  # noqa: PLR0913 - as `serve`
     elif drift(limits, course, here.position, here.velocity, period):
         open_loops(c, min(max(s.value, -1.0), 1.0) * p.law.max_command)
     else:
+        come_to_rest(limits, course)
+        advance(limits, course, period)
+        c.reference.acceleration = course.acceleration
         return DRIVEN_OFF
     c.reference.acceleration = min(max(rate, -limits.acceleration), limits.acceleration)
     return 0

@@ -50,7 +50,7 @@ def test_recordings_of_machines():
     assert set(verdicts.values()) >= {"trusted", "partly trusted", "refused"}
 
 
-@pytest.mark.wide
+@pytest.mark.long
 @pytest.mark.parametrize("number", NEAR_BORDER)
 def test_simulated_logs_near_the_border(number: int, tmp_path: Path):
     case, path = make_case(number), tmp_path / "log.csv"
