@@ -842,7 +842,7 @@ def test_12_a_slide_that_a_fault_has_taken_the_torque_from_is_commanded_nothing_
 
 
 THOUSAND = [*enumerate([60] * 10 + [100] * 7 + [200] * 3)]  # parts of 50 sequences, and how many rules each has
-FIRST = {0, 1, 2, 10, 11, 17}  # that every change meets
+FIRST = {0, 10, 17}  # that every change meets
 
 
 @pytest.mark.parametrize(("part", "steps"), [
