@@ -102,9 +102,11 @@ class Heard:
         """What is answered to these bytes."""
         self.said.clear()
         self.reader.take(data)
-        idle = 0
+        idle, left = 0, 100_000
         while idle < turns:  # a start of a motion looks once in two milliseconds
             await asyncio.sleep(0)
+            left -= 1
+            assert left, "it waits for something that does not come"
             idle = 0 if self.reader._lines.qsize() or self._busy else idle + 1
             assert idle or not self.reader._working.done(), "the line is dead"
         assert not self.reader._working.done(), "the line is dead"
