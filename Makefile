@@ -93,14 +93,14 @@ bench-smoke: venv-test ## run every benchmark once, without measuring
 # few lines that the unit tests do not.
 BLOCKS   := $(addprefix tests/unit/,control drive planning plant sensing)
 STEPS    := $(BLOCKS) $(addprefix tests/unit/,kernel $(addprefix operate/test_,drivers.py loop.py watchdog.py)) \
-            $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py live.py plant.py system*.py))
+            $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py live*.py plant.py system*.py))
 WHOLE    := $(addprefix tests/unit/,methods identify cli export tune)
 PANEL    := _49_ or _50_ or _51_ or _52_ or _53_
 SEEN     := not long and not wide and not bench and not process
 COVER    := $(BIN)/python -m coverage run -m pytest $(PYTEST_ARGS)
 # The faces are processes of their own, which are measured with their clients' tests.
 FACES    := $(BIN)/python -m coverage run --rcfile=$(CURDIR)/tests/faces.coveragerc -m pytest $(PYTEST_ARGS) \
-            -m "not long and not wide" -k "not test_15 and not test_29 and not test_30 and not test_31" \
+            -m "not long and not wide" -k "not test_29 and not test_31" \
             tests/acceptance/test_faces.py
 coverage: venv-test ## which lines and branches the unit tests reach
 	rm -f .coverage.faces.*
