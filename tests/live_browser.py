@@ -15,8 +15,8 @@ from typing import Any, Self
 import pytest
 
 import detent
-from detent.operate.channel import channel_of
 from detent.operate.client import LiveAxis
+from detent.operate.opening import channel_of
 from detent.operate.start import connect
 from detent.panel.keys import keys_of, link_of
 

@@ -269,8 +269,8 @@ def connect(
     as_json: Json = False,
 ) -> None:
     """Ask an axis that runs live for something, and wait until that has ended."""
-    from detent.operate.channel import running_channel
     from detent.operate.faults import describe_fault
+    from detent.operate.opening import running_channel
     from detent.operate.start import connect as connect_to
     from detent.operate.words import PLACES, describe_status
     from detent.panel.keys import keys_of, link_of

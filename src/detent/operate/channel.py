@@ -10,7 +10,6 @@ told how many. One that does not read what it is sent is dropped; one that is go
 import asyncio
 import json
 import math
-import os
 import socket
 import struct
 import threading
@@ -18,7 +17,6 @@ from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from hashlib import sha256
 from inspect import signature
 from pathlib import Path
 from typing import Any, cast
@@ -50,40 +48,6 @@ QUESTIONS: dict[str, Callable[..., Any]] = {
     "faults": Session.faults,
 }
 """What only reads: the method of `Session` that answers; what else stands in the message are its arguments."""
-
-
-def runtime_folder() -> Path:
-    """Folder of this user's channels, which nobody else may enter."""
-    base = os.environ.get("XDG_RUNTIME_DIR")
-    folder = Path(base, "detent") if base else Path("/tmp", f"detent-{os.getuid()}")  # noqa: S108 - made 0700 below
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    held = folder.stat()
-    if held.st_uid != os.getuid() or held.st_mode & 0o077:
-        raise DetentError(
-            f"{folder}: it belongs to somebody else, or others may enter it; remove it, or set XDG_RUNTIME_DIR"
-        )
-    return folder
-
-
-def channel_of(file: Path, motor: str = "") -> Path:
-    """Socket of the axis that a file describes, or of one of its motors, of a file with several."""
-    path = file.resolve()
-    stem = "".join(c if c.isascii() and c.isalnum() else "-" for c in path.stem)[: 32 - len(motor[:24])]
-    name = [f"{stem}-{sha256(str(path).encode()).hexdigest()[:10]}", *([motor] if motor else []), "sock"]
-    return runtime_folder() / ".".join(name)
-
-
-def running_channel(file: Path, motor: str = "") -> Path:
-    """Socket of the motor that is named, or of the only one of a file that runs."""
-    alone = channel_of(file)
-    if alone.exists() or motor:
-        return alone if alone.exists() else channel_of(file, motor)
-    mark = alone.stem.rpartition("-")[2]
-    several = {path.name.split(".")[-2]: path for path in sorted(alone.parent.glob(f"*-{mark}.*.sock"))}
-    if len(several) > 1:
-        got = f"{shown(str(file))}: its motors run live, each by itself"
-        raise DetentError(f"{got}; expected: the name of one, {' or '.join(several)}; name it with --motor")
-    return next(iter(several.values()), alone)
 
 
 @dataclass

@@ -13,12 +13,12 @@ from detent.errors import AxisError, DetentError
 from detent.methods.load import AxisFile, read_axis
 from detent.methods.registry import METHODS
 from detent.operate.audit import Audit
-from detent.operate.channel import Channel, Connection, channel_of, running_channel
+from detent.operate.channel import Channel, Connection
 from detent.operate.client import LiveAxis
 from detent.operate.drivers.driver import SIMULATED, driver_of
 from detent.operate.host import PERIOD, Host, operation_params
 from detent.operate.loop import Board
-from detent.operate.opening import store_path
+from detent.operate.opening import channel_of, running_channel, store_path
 from detent.operate.session import Session
 from detent.operate.store import Store
 

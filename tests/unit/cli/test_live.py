@@ -20,8 +20,9 @@ from detent.cli.live import _about
 from detent.cli.running import places
 from detent.errors import DetentError
 from detent.operate.audit import Audit
-from detent.operate.channel import Channel, channel_of, running_channel
+from detent.operate.channel import Channel
 from detent.operate.host import Log
+from detent.operate.opening import channel_of, running_channel
 from detent.operate.session import Session
 from detent.panel.child import PanelPlace
 from detent.panel.keys import keep_keys, keys_of, make_keys

@@ -68,11 +68,13 @@ def test_a_voltage_of_two_levels_is_not_saturated(tmp_path: Path) -> None:
     volts = np.where(np.arange(0.0, 20.0, STEP) % 2.0 < 1.0, 4.0, -4.0)
     rows = [(k * STEP, u, x, "a") for k, (u, x) in enumerate(zip(volts.tolist(), driven(volts).tolist(), strict=True))]
     found = identify_axis(written(tmp_path / "log.csv", rows))
-    assert "saturated" not in {refusal.subject for refusal in found.refusals}
-    assert found.verdict in ("trusted", "partly trusted"), found.refusals
-    # Positions in millimetres, two speeds: the friction depends on the window, and may be refused for that.
     assert found.constants["mass"].value == pytest.approx(TRUTH["mass"], rel=0.02)
-    assert "mass" in {one.name for one in found.found.trusted}
+    # In positions rounded to millimetres, at two speeds, the friction is a quarter too small by windows of 80 ms, and
+    # was trusted so; by wider ones it is right, and what depends on the window is refused. The mass does not.
+    assert {refusal.subject for refusal in found.refusals} == {"depends on the window"}
+    assert {one.name for one in found.found.trusted} == {"mass"}
+    assert all(found.constants[name].value < 0.85 * TRUTH[name] for name in ("coulomb.positive", "coulomb.negative"))
+    assert all(one.low <= TRUTH[one.name] <= one.high for one in found.found.trusted)
 
 
 def test_a_column_that_changes_while_rows_follow_one_another_tells_no_tests_apart(tmp_path: Path) -> None:
