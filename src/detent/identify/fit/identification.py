@@ -253,15 +253,15 @@ def _other_way(runs: Sequence[Run], tested: _Tested, fit: Fit, rung: Rung, repor
     # far as those of the regression.
     try:
         seen, horizons, closed = _test_simulation(runs, fit, rung, "output error", report)
-        refined = _refine(runs, tested.constants, "output error", report)
+        other, by = missed(tested.horizons), missed(horizons)
+        told = f"the regression misses held-out travel by {other:.0%}, the simulation fit by {by:.0%}"
+        if seen is None or not 0.0 < by < min(BETTER_MISSED * other, WELL_MET):
+            return tested._replace(believed=f"{told}: neither is to be believed")
+        refined = reaching(_refine(runs, tested.constants, "output error", report), tested.constants)
     except DetentError:  # too short for its stretches
         return tested
-    other, by = missed(tested.horizons), missed(horizons)
-    told = f"the regression misses held-out travel by {other:.0%}, the simulation fit by {by:.0%}"
-    if seen is None or not 0.0 < by < min(BETTER_MISSED * other, WELL_MET):
-        return tested._replace(believed=f"{told}: neither is to be believed")
     believed = f"{told}: its constants are given, with intervals that hold those of both"
-    return _Tested(reaching(refined, tested.constants), seen, horizons, closed, believed, tested.disagreement)
+    return _Tested(refined, seen, horizons, closed, believed, tested.disagreement)
 
 
 def _check_alike(runs: Sequence[Run]) -> None:
