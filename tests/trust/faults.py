@@ -432,4 +432,4 @@ FAULTS = (
     Fault("effort updated in every 10th row", held("effort", 10)),
     Fault("position that wraps at any place", wrapped),
 )
-"""Every kind; those at even places were looked at when rules were chosen, those at odd places were not."""
+"""Kinds that were looked at when rules were chosen; `unseen` holds those that were not."""

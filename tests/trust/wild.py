@@ -21,8 +21,12 @@ from tests.places import DATA
 from tests.trust.faults import FAULTS, Table
 from tests.trust.plants import make_case
 from tests.trust.table import table
+from tests.trust.unseen import UNSEEN
 
-SIMULATED = (7001, 7005)
+KINDS = (*FAULTS, *UNSEEN)
+"""Every kind, by its number."""
+
+SIMULATED = (7001, 7002, 7003, 7005)
 """Numbers of cases that faults are put into."""
 
 SERVO = ("time=timestamp", "position=position [rad]", "reference=goal_position [rad]", "velocity=", "command=load")
@@ -144,7 +148,7 @@ def truth(name: str) -> Identification:
 def judge_fault(asked: tuple[str, int]) -> Outcome:
     """Identify a log with a fault, and compare its trusted constants with those of the clean log."""
     log, number = asked
-    fault, made = FAULTS[number], clean(log)
+    fault, made = KINDS[number], clean(log)
     rng = np.random.default_rng(zlib.crc32(f"{log} {fault.name}".encode()))
     found = found_in(made, fault.spoil({k: v.copy() for k, v in made.table.items()}, rng))
     if isinstance(found, str):
@@ -164,7 +168,7 @@ def judge_fault(asked: tuple[str, int]) -> Outcome:
 
 def judge_faults(numbers: Sequence[int], logs: Sequence[str] = (), workers: int | None = None) -> list[Outcome]:
     """Judge every log with every one of some faults."""
-    asked = [(log, k) for log in logs or SOURCES for k in numbers if (FAULTS[k].needs or "time") in clean(log).table]
+    asked = [(log, k) for log in logs or SOURCES for k in numbers if (KINDS[k].needs or "time") in clean(log).table]
     if workers == 1:
         return [judge_fault(one) for one in asked]
     os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
@@ -192,8 +196,9 @@ def page(outcomes: Sequence[Outcome]) -> str:
     logs = list(dict.fromkeys(o.log for o in outcomes))
     kinds = len({o.fault for o in outcomes})
     text = HEAD.format(kinds=kinds, logs=f"{', '.join(logs[:-1])} and {logs[-1]}")
-    for title, first in (("Kinds that rules were chosen with", 0), ("Kinds that they were not chosen with", 1)):
-        names = [fault.name for fault in FAULTS[first::2]]
+    titles = ("Kinds that rules were chosen with", "Kinds that they were not chosen with")
+    for title, part in zip(titles, (FAULTS, UNSEEN), strict=True):
+        names = [fault.name for fault in part]
         text += f"\n## {title}\n\n{fault_table([o for o in outcomes if o.fault in names])}"
     return text
 
@@ -227,7 +232,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "fault-table.md"
 
 def main() -> None:
     """Judge all logs with all faults, and write the page."""
-    PAGE.write_text(page(judge_faults(range(len(FAULTS)))), encoding="utf-8")
+    PAGE.write_text(page(judge_faults(range(len(KINDS)))), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ class Kind(StrEnum):
     REPEATED_STAMPS = "repeated stamps"
     TIME_BACKWARDS = "time runs backwards"
     IRREGULAR_TIME = "irregular time"
+    DRIFTING_CLOCK = "drifting clock"
     DROPPED_ROWS = "dropped rows"
     WRAPPED_COUNTER = "wrapped counter"
     UNSIGNED = "signed read as unsigned"

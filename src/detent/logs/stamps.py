@@ -20,6 +20,11 @@ FARTHEST = 50  # rows by which a row out of order is put back into its place
 _HOLE = 1.4  # usual steps between two rows from which a third is missing there
 JITTER = 0.05  # deviation of a step from the usual one, as its share, from which it is irregular
 _ODD = 0.25  # deviation of a single step worth a note
+# Change of the step along a recording, over the step, from which the clock drifts, and in the usual change from one
+# step to the next: what comes unevenly is a sampler that waits, and its stamps are right.
+DRIFTS, EVENLY = 0.02, 10.0
+STEADY = 0.5  # share of the change between neighbouring eighths, at most
+EIGHTHS = 8  # parts of a recording whose mean steps are compared
 WIDTHS = (16, 32)  # bits of counters that are tried where none are stated
 POSITIONS = ("position", "position_load", "reference")  # signals that come from counters
 
@@ -89,6 +94,11 @@ def _keep_longest(draft: Draft) -> None:
     away = np.ones(len(t), dtype=np.bool_)
     away[bounds[longest] : bounds[longest + 1]] = False
     begins = ", ".join(str(int(draft.rows[first])) for first in firsts[1:6])
+    if float(np.min(t[firsts[1:]] - t[0])) > 0.5 * float(np.min(t[np.array(firsts[1:]) - 1] - t[0])):
+        back = float(np.max(t[np.array(firsts[1:]) - 1] - t[firsts[1:]]))
+        text = f"the clock is set back at row {begins}, by up to {back:.3g}: how fast it runs is not known"
+        advice = "record the time by a clock that nobody sets, or identify parts alone"
+        draft.note(Kind.DRIFTING_CLOCK, "time", firsts[1:], text, Action.LEFT, advice, Severity.ERROR)
     text = f"the clock restarts at row {begins}: {len(firsts)} recordings in one file; the longest is read"
     advice = "cut the file at these rows to read the others"
     draft.note(Kind.TIME_BACKWARDS, "time", away, text, Action.REMOVED, advice, Severity.ERROR)
@@ -194,10 +204,29 @@ def look_at_clock(draft: Draft) -> None:
         if len(odd):
             text = f"{tell_count(len(odd), 'step')} other than the usual {usual * 1e3:.4g} ms"
             draft.note(Kind.IRREGULAR_TIME, "time", odd + 1, text, Action.LEFT, "", Severity.NOTE)
+    if drift := _drift(steps[ratio < (2.5 if is_uneven else 1.5)]):
+        first, last = drift
+        text = f"steps go evenly from {first * 1e3:.4g} to {last * 1e3:.4g} ms: sampler and clock do not run together"
+        advice = "record time and rows by one clock, or identify parts alone"
+        draft.note(Kind.DRIFTING_CLOCK, "time", [], text, Action.LEFT, advice, Severity.ERROR)
     if len(gaps):
         lost = [round(one) - 1 for one in ratio[gaps].tolist()]  # a stamp far off makes more of them than 64 bits hold
         text = f"about {tell_count(sum(lost), 'row')} missing before these, at most {max(lost)} at once"
         draft.note(Kind.DROPPED_ROWS, "", gaps + 1, text, Action.LEFT)
+
+
+def _drift(steps: Values) -> tuple[float, float] | None:
+    """Mean steps of the first and the last eighth, of a clock that drifts from the one to the other; else None."""
+    if len(steps) < EIGHTHS * FEWEST:
+        return None
+    means = np.array([float(part.mean()) for part in np.array_split(steps, EIGHTHS)])
+    usual, span = float(np.median(means)), float(np.ptp(means))
+    scatter = float(np.median(np.abs(np.diff(steps))))
+    # A clock drifts all the way: a sampler that takes more turns in a part of a run does so from one row to the next.
+    is_steady = float(np.abs(np.diff(means)).max()) < STEADY * span and span <= abs(float(means[-1] - means[0]))
+    if span < DRIFTS * usual or span < EVENLY * scatter or not is_steady:
+        return None
+    return float(means[0]), float(means[-1])
 
 
 def stretches(t: Values) -> list[slice]:

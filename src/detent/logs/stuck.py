@@ -47,6 +47,7 @@ PILED = 3.0
 up: a sine that was rounded has 1.4 times as many."""
 
 NEIGHBOURS = 5
+HEAPED = 20.0  # the same from which no plateau is needed: noise takes a signal from its limit and back
 
 _FULL_SCALES = frozenset(
     {float(value) for bits in (8, 10, 12, 14, 15, 16) for value in (2**bits - 1, 2 ** (bits - 1))}
@@ -247,9 +248,10 @@ def _find_plateau(draft: Draft, role: str, side: float) -> None:
     levels, counts = np.unique(side * values, return_counts=True)
     is_end = side * values == levels[-1]
     runs = runs_of(is_end)
-    is_piled = counts[-1] >= max(FEWEST_CUT, PILED * float(counts[-1 - NEIGHBOURS : -1].max(initial=0)))
+    beside, longest = float(counts[-1 - NEIGHBOURS : -1].max(initial=0)), int((runs[:, 1] - runs[:, 0]).max())
+    is_piled = counts[-1] >= max(FEWEST_CUT, (PILED if longest >= PLATEAU else HEAPED) * beside)
     is_commanded = stepped(values, is_end, float(np.ptp(values)))[is_end].mean() > MOSTLY_STEPPED
-    if is_piled and not is_commanded and (runs[:, 1] - runs[:, 0]).max() >= PLATEAU:
+    if is_piled and not (is_commanded and longest >= PLATEAU):
         end, where, factor = side * float(levels[-1]), np.flatnonzero(is_end), abs(draft.sources[role].factor)
         is_symmetric = bool(np.isclose(values.max(), -values.min(), rtol=1e-3))
         is_full = any(np.isclose(abs(end) / factor, scale, rtol=1e-9) for scale in _FULL_SCALES)

@@ -105,17 +105,23 @@ def test_a_resonance_says_how_fast_a_loop_may_be() -> None:
 
 
 @pytest.mark.skipif(not DATA.exists(), reason="the recordings are not at hand")
-def test_two_commands_that_differ_on_one_log_say_why() -> None:
+def test_two_commands_agree_on_one_log() -> None:
+    """149.6 N s/m from constant speeds alone, 166.3 from all motion: the limits carry what the model leaves open.
+
+    A friction that falls to standstill would tell this log better by eight standard errors, with 155.1 N s/m.
+    """
     path, columns = DATA / "emps" / "DATA_EMPS.mat", ["force=vir [35.15 N]"]
     analysed = detent.analyse(path, "two-speeds", columns=columns)
     identified = detent.identify_axis(path, columns=columns)
-    (remark,) = analysed.remarks
-    assert remark.startswith("viscous friction in positive direction: 166.3 ± 4.6 N s/m from all motion")
-    assert "149.6 ± 6.1 N s/m from the constant speeds from 0.0421 to 0.125 m/s alone" in remark
-    assert remark in identified.remarks
-    (delay,) = [one for one in identified.remarks if one.startswith("delay")]
-    assert "negative, which is not causal" in delay
-    assert all(one in repr(identified).replace("\n  ", " ") for one in ("negative, which", "from all motion"))
+    steady = next(one for one in analysed["two-speeds"].estimates if one.name == "viscous.positive")
+    whole = identified.constants["viscous.positive"]
+    assert steady.value == pytest.approx(149.6, abs=0.05)
+    assert whole.value == pytest.approx(166.3, abs=0.05)
+    assert whole.holds(steady.value)
+    assert analysed.remarks == ()
+    (delay,) = identified.remarks
+    assert delay.startswith("delay")
+    assert delay in repr(identified).replace("\n  ", " ")
     assert identified.to_dict()["remarks"] == list(identified.remarks)
 
 

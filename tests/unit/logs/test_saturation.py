@@ -65,3 +65,12 @@ def test_signals_that_are_not_cut_off(values):
 
 def test_positions_may_stay_where_they_are():
     assert findings(np.clip(WAVE, -255, 255), role="position") == findings(np.clip(WAVE, -9, 9), role="velocity") == []
+
+
+def test_noise_that_takes_a_signal_from_its_limit_and_back():
+    """Hardly two rows at the limit follow one another, and it is left and reached by large steps."""
+    noisy = WAVE + 200 * np.random.default_rng(9).normal(size=len(T))
+    (finding,) = findings(np.minimum(noisy, 251.5))
+    assert finding.kind is Kind.SATURATED
+    assert finding.text.endswith(f"in {np.count_nonzero(noisy >= 251.5)} rows")
+    assert findings(noisy) == []

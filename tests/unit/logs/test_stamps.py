@@ -172,6 +172,28 @@ def test_an_uneven_clock_loses_no_rows():
     assert "of the usual 20 ms" in finding.text
 
 
+def drifts(steps):
+    draft = draft_of(np.cumsum(steps))
+    look_at_clock(draft)
+    return [finding for finding in draft.findings if finding.kind is Kind.DRIFTING_CLOCK]
+
+
+def test_a_clock_that_drifts_is_told_by_its_steps():
+    course = np.linspace(0.0, 1.0, 800)
+    (finding,) = drifts(0.01 * (1.0 + 0.05 * course))
+    assert finding.severity is Severity.ERROR
+    assert "steps go evenly from 10.03 to 10.47 ms" in finding.text
+
+
+def test_what_is_no_drift_of_a_clock():
+    """Less than 2 %; a sampler that waits by chance; one that takes longer turns in a part of the run; a few rows."""
+    course, rng = np.linspace(0.0, 1.0, 800), np.random.default_rng(2)
+    assert drifts(0.01 * (1.0 + 0.015 * course)) == []
+    assert drifts(0.01 * (1.0 + 0.05 * course + 0.02 * rng.exponential(size=800))) == []
+    assert drifts(0.01 * (1.0 + 0.3 * (course > 0.5))) == []
+    assert drifts(0.01 * (1.0 + 0.05 * course[::12])) == []
+
+
 def test_stretches():
     t = np.r_[np.arange(5), np.arange(10, 15), np.arange(16, 20)].astype(float)
     assert stretches(t) == [slice(0, 5), slice(5, 14)]

@@ -282,6 +282,11 @@ class Motion:
     rows: Rows  # samples around which the windows lie
     kernel: Kernel  # their window
 
+    def taken(self, keep: NDArray[np.bool_]) -> "Motion":
+        """Some of the windows."""
+        names = ("position", "velocity", "acceleration", "right", "left", "rows")
+        return replace(self, **{name: getattr(self, name)[keep] for name in names})
+
 
 def fine_kernel(kernel: Kernel) -> Kernel:
     """The short window that tells the direction."""

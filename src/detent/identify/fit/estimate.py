@@ -154,9 +154,11 @@ def long_run_variance(scores: Values, cosines: int) -> Values:
     return projected.T @ projected / len(projected)
 
 
-def coloured_covariance(columns: Values, residual: Values, instruments: Values | None = None) -> tuple[Values, int]:
-    """Covariance of the constants of a regression with coloured residuals."""
-    n, k = columns.shape
+def coloured_covariance(
+    columns: Values, residual: Values, instruments: Values | None = None, *, others: int = 0
+) -> tuple[Values, int]:
+    """Covariance of the constants of a regression with coloured residuals, to which `others` were fitted as well."""
+    n, k = columns.shape[0], columns.shape[1] + others
     chosen = columns if instruments is None else instruments
     size, length = column_sizes(columns), column_sizes(chosen)
     independent = independent_rows(residual)

@@ -11,7 +11,7 @@ from detent.errors import DetentError, InputError
 from detent.files.screen import OnScreen
 from detent.identify.fit import untold
 from detent.identify.fit.constants import Constants, constants_of, reaching
-from detent.identify.fit.equations import LOSS, Run, make_kernel, make_run
+from detent.identify.fit.equations import LOSS, Rows, Run, make_kernel, make_run
 from detent.identify.fit.estimate import Estimate, quantile
 from detent.identify.fit.free_run import ClosedLoop, Horizon, simulate_closed_loop, simulate_horizons
 from detent.identify.fit.ladder import (
@@ -43,8 +43,8 @@ from detent.identify.fit.verdict import (
     look_at_windows,
     missed,
 )
-from detent.identify.fit.windows import moved_by_windows, widened
-from detent.logs.log import Log
+from detent.identify.fit.windows import moved_by_windows, odd_windows, widened, without
+from detent.logs.log import Log, tell_rows
 
 Report = Callable[[str, float], None]
 Method = Literal["auto", "regression", "output error"]
@@ -57,6 +57,9 @@ NOISE_SHARE: dict[Instruments, float] = {"reference": 0.1, "position": 0.01, "no
 # Cosine between velocities, and between accelerations, of instruments and axis, from which on they are taken.
 LIKENESS: dict[Instruments, float] = {"reference": 0.6, "position": 0.95}
 WIDEST_BEND = 0.5  # half of the interval of a Stribeck velocity or a loss over its value, at most
+CLEARLY = 3.0  # gain of a rung that cannot be, in standard errors, from which the chosen one lacks something
+ROUNDS_OUT = 3  # fits in which windows that stick out are left out, at most
+FEWEST_LEFT = 5 * len(RUNGS[-1].terms)  # windows of all logs, at least
 HELD_OUT = 0.25  # last part of a log that the simulation is tested on
 TURN = 0.5  # range of an angle from which on a weight may show [rad]
 _WAYS: dict[Instruments, str] = {
@@ -170,14 +173,16 @@ def identify(
     parts = choose_windows(runs)
     refusals += look_at_motion(runs, parts)
     windows = sum(len(p.motion.rows) for p in parts)
-    if windows < 5 * len(RUNGS[-1].terms):
+    if windows < FEWEST_LEFT:
         if not refusals:
             refusals.append(Refusal("too short", "hardly any window without standstill", "record longer moves"))
         return Identification(tuple(logs), runs, None, (), (), None, (), tuple(refusals))
-    climbs, fit, rivals = _fit_all(parts, runs, report)
+    parts, (climbs, fit, rivals), odd = _fit_usual(parts, runs, report)
+    runs = tuple(p.run for p in parts)
+    windows = sum(len(p.motion.rows) for p in parts)
     changes = changes_of(parts, fit)
     own = replace(fit, covariance=fit.covariance.copy())
-    widen(fit, changes)
+    widen(parts, fit, changes)
     constants = constants_of(fit, rivals)
     refusals += look_at_fit(parts, fit, chosen_climb(climbs).error, changes)
     tested = _Tested(constants)
@@ -200,6 +205,7 @@ def identify(
     kernel, told = parts[0].motion.kernel, f"{runs[0].effort_name} [{runs[0].effort_unit}]"
     width = 2e3 * kernel.half * kernel.step
     notes = (f"effort: {told}", f"windows of {width:.3g} ms, {windows} of them", _WAYS[parts[0].instruments])
+    notes += tuple(_told_odd(log, run, rows) for log, run, rows in zip(logs, runs, odd, strict=True) if len(rows))
     notes += (tested.believed,) if tested.believed else ()
     if not tested.believed and method != "output error" and (miss := missed(horizons)) > WELL_MET:
         notes += (f"held-out travel is missed by {miss:.0%}: --method output-error may predict it better",)
@@ -347,6 +353,29 @@ def _fit_all(
     return climbs, fits.pop(chosen.rung.name), list(fits.values())
 
 
+def _fit_usual(
+    parts: Sequence[Prepared], runs: Sequence[Run], report: Report
+) -> tuple[Sequence[Prepared], tuple[tuple[Climb, ...], Fit, list[Fit]], list[Rows]]:
+    """Fit without the windows that stick out; what is left, the fit, and the middles of those left out."""
+    found, left_out = _fit_all(parts, runs, report), [np.zeros(0, dtype=np.intp) for _ in parts]
+    for _ in range(ROUNDS_OUT):
+        odd = odd_windows(parts, found[1])
+        fewer = [without(p, rows) for p, rows in zip(parts, odd, strict=True)]
+        if not any(map(len, odd)) or sum(len(p.motion.rows) for p in fewer) < FEWEST_LEFT:
+            break
+        parts, found = fewer, _fit_all(fewer, runs, report)
+        left_out = [np.union1d(a, b) for a, b in zip(left_out, odd, strict=True)]
+    return parts, found, left_out
+
+
+def _told_odd(log: Log, run: Run, rows: Rows) -> str:
+    """Windows that were left out, by the rows of the file in their middles."""
+    places = np.clip(np.searchsorted(log.t, log.t[0] + rows * run.step), 0, len(log.t) - 1)
+    cuts = np.flatnonzero(np.diff(rows) > 2 * WINDOW / run.step) + 1
+    named = [(int(log.rows[part[0]]), int(log.rows[part[-1]])) for part in np.split(places, cuts)]
+    return f"{log.name}: left out about {tell_rows(named)}: the effort there is not that of the rest of the log"
+
+
 def _is_told(parts: Sequence[Prepared], fit: Fit) -> bool:
     """True where the log tells the bend of a model, more than a bound of it, and that friction rises to standstill."""
     # A model that predicts well with constants that nobody knows stays among the rivals: its spread widens the limits.
@@ -359,8 +388,11 @@ def _is_told(parts: Sequence[Prepared], fit: Fit) -> bool:
 
 
 def _is_rival(c: Climb, chosen: Climb) -> bool:
-    """True for the chosen rung, and for one whose predictions are as good within their scatter."""
+    """True for the chosen rung, and for one whose predictions are as good within their scatter, or impossibly good."""
     if c is chosen:
+        return True
+    # Friction that falls to standstill is none that the model has; but if it tells the log better, the model lacks it.
+    if not c.possible and c.gain > CLEARLY:
         return True
     if not c.possible or len(c.stretches) != len(chosen.stretches) or "viscous" not in " ".join(c.rung.terms):
         return False

@@ -1,10 +1,15 @@
-"""Whether the constants of a log stay what they are along it: one number cannot say what changes.
+"""Whether the constants of a log are the same throughout it: one number cannot say what changes.
 
-Each column of a model is joined by itself times a course over the log: a straight line, or a step at a quarter, half or
-three quarters of it. What these are given is by how much a constant changes to each side of its mean. Where that is
-more than chance, the log is not of one axis, or not by one effort: a sensor of current that drifts, a load put on, a
-second half of another axis, a clock that runs away, a friction that warms up. A slight change widens the interval; a
-large one is refused with its size.
+Columns of a model are joined by themselves times a *course*, from -1 to 1: a straight line over the log, a step in its
+middle, the sign of the effort, the direction, the speed. What such a column is given is by how much a constant changes
+to each side of its mean. Where that is more than chance, the log is not of one axis, or not by one effort: a sensor of
+current that drifts, a load put on, a second half of another axis, a clock that runs away, a friction that warms up; an
+amplifier with another gain for each sign, a filter, a sensor that is not even. A gain of the whole effort changes all
+constants alike, and is told where no single one is. A slight change widens the interval; a large one is refused with
+its size.
+
+The amplitude of one more column needs no fit of all of them: what the other columns explain of it is taken away, and
+what is left explains what they leave (Frisch, Waugh: Partial time regressions. Econometrica 1 (1933)).
 
 Nyblom: Testing for the constancy of parameters over time. J. American Statistical Association 84 (1989).
 Andrews: Tests for parameter instability and structural change with unknown change point. Econometrica 61 (1993).
@@ -12,6 +17,7 @@ Andrews: Tests for parameter instability and structural change with unknown chan
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,64 +26,171 @@ from detent.identify.fit.estimate import carried_degrees, coloured_covariance, q
 from detent.logs.differences import scipy
 from detent.logs.log import Values
 
-CHANCE = 2e-5  # probability of a change as clear by chance, in each direction, of one constant with one course
+# Probability of a change as clear by chance, in each direction: of one constant with one course of time, and of the
+# mass or the whole effort with any.
+CHANCE, CHANCE_WHOLE = 2e-5, 2.5e-4
 ROWS_EACH = 8  # windows for each column, at least
 SLIGHT = 0.03  # change to each side, over the mass or in parts of the effort, up to which it only widens the limits
-SIDE = 0.15  # share of what tells a constant that each half of a log holds, at least
-STEPS = (0.0,)  # moments of a step, from -1 at the begin of a log to 1 at its end
+MOST_OF_MOTION = 0.1  # the same of a mass or a gain that changes with the motion, where it has a mean
+SIDE = 0.15  # share of what tells a constant that each side of a course holds, at least
+OWN = 1e-3  # part of a column that no other explains, from which on it is one of its own
+SPEED, SIGN = "with the speed", "with its sign"
+GAIN, FORCE = "gain of the effort", "zero of the effort"  # what may change beside the constants of the model
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """By how much a constant changes along a log."""
+    """By how much a constant changes within a log."""
 
-    name: str  # term of the model
+    name: str  # term of the model, or `GAIN`, or `FORCE`
     mean: float  # and amplitude: its constant, and the change to each side of it
     amplitude: float
-    share: float  # the amplitude over the mass, or what it does to the effort over the effort
-    course: str  # how it changes
+    share: float  # the amplitude over the mass or the gain, or what it does to the effort over the effort
+    course: str  # with what it changes
+
+    @property
+    def is_large(self) -> bool:
+        """True where it is more than an interval should carry."""
+        # Friction is no straight line of the speed anyway, and of a mass that sensors are too coarse for, the mean holds.
+        if not self.is_of_motion or (self.name == GAIN and self.course == SIGN):
+            return self.share > SLIGHT
+        return self.name in {"mass", GAIN} and self.share > MOST_OF_MOTION
+
+    @property
+    def is_of_motion(self) -> bool:
+        """True where it changes with what the axis does, and not with time."""
+        return "along the log" not in self.course
+
+
+class _Look(NamedTuple):
+    """A column that tells a change, and its instrument."""
+
+    name: str
+    course: str
+    column: Values
+    tool: Values
+    mean: float
+    chance: float
 
 
 def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> list[Change]:
-    """Terms of a fitted model whose constants change along the log by more than chance, the clearest course of each."""
+    """Terms of a fitted model whose constants change within the log by more than chance, the clearest course each."""
     x, z, effort = regression.columns_of(parts, fit)
-    terms = equations.terms_of(fit.model)
     if len(x) < ROWS_EACH * (x.shape[1] + 1):
         return []
+    theta = regression.solve(z, x, effort)
+    rest, size = effort - regression.combine(x, theta), max(rms(effort), 1e-300)
+    limits = {name: quantile(d) * fit.error(name) for name, d in zip(fit.names, fit.degrees.tolist(), strict=True)}
     found: dict[str, tuple[float, Change]] = {}
-    for course, along in _courses(parts):
-        for k, name in enumerate(terms):
-            power = x[:, k] ** 2
-            if not SIDE < float(power[along > 0.0].sum()) / max(float(power.sum()), 1e-300) < 1.0 - SIDE:
-                continue
-            columns, tools = (np.column_stack([a, a[:, k] * along]) for a in (x, z))
-            values = regression.solve(tools, columns, effort)
-            residual = effort - regression.combine(columns, values)
-            covariance, cosines = coloured_covariance(columns, residual, tools)
-            degrees = float(carried_degrees(columns, residual, tools, cosines)[-1])
-            amplitude, error = float(values[-1]), float(np.sqrt(max(covariance[-1, -1], 0.0)))
-            own = quantile(float(fit.degrees[k])) * float(np.sqrt(max(fit.covariance[k, k], 0.0)))
-            least = -float(scipy("special").stdtrit(max(degrees, 1.0), CHANCE))
-            clear = abs(amplitude) / max(error * least, 1e-300)
-            size = abs(amplitude) * rms(x[:, k]) / max(rms(effort), 1e-300)
-            share = abs(amplitude / float(values[k])) if name == "mass" and values[k] else size
-            if clear > max(1.0, found.get(name, (0.0,))[0]) and (abs(amplitude) > own or share > SLIGHT):
-                found[name] = clear, Change(name, float(values[k]), amplitude, share, course)
+    for look in _looks(parts, fit, x, z):
+        amplitude, least = _amplitude(look, x, z, rest)
+        is_relative = look.name in {"mass", GAIN} and look.mean
+        share = abs(amplitude / look.mean) if is_relative else abs(amplitude) * rms(look.column) / size
+        clear = abs(amplitude) / max(least, 1e-300)
+        own = limits.get(look.name, 0.0)
+        if clear > max(1.0, found.get(look.name, (0.0,))[0]) and (abs(amplitude) > own or share > SLIGHT):
+            found[look.name] = clear, Change(look.name, look.mean, amplitude, share, look.course)
     return [change for _, change in found.values()]
 
 
-def _courses(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
+def _amplitude(look: _Look, x: Values, z: Values, rest: Values) -> tuple[float, float]:
+    """Constant of one more column, and the size up to which it is chance; 0 for a column that others explain."""
+    column = look.column - regression.combine(x, regression.solve(z, x, look.column))
+    tool = look.tool - regression.combine(z, regression.solve(x, z, look.tool))
+    length = float(np.linalg.norm(tool) * np.linalg.norm(column))
+    if length < OWN * float(np.linalg.norm(look.tool) * np.linalg.norm(look.column)):
+        return 0.0, 1.0
+    column, tool = column[:, None], tool[:, None]
+    amplitude = float(regression.solve(tool, column, rest)[0])
+    left = rest - amplitude * column[:, 0]
+    covariance, cosines = coloured_covariance(column, left, tool, others=x.shape[1])
+    degrees = float(carried_degrees(column, left, tool, cosines)[0])
+    reach = -float(scipy("special").stdtrit(max(degrees, 1.0), look.chance))
+    return amplitude, reach * float(np.sqrt(max(covariance[0, 0], 0.0)))
+
+
+def _looks(parts: Sequence[regression.Prepared], fit: regression.Fit, x: Values, z: Values) -> Iterator[_Look]:
+    """Columns that tell changes: of each constant with time, of the mass and the whole effort with all."""
+    terms = equations.terms_of(fit.model)
+    theta = fit.values[: len(terms)]
+    effort, told = regression.combine(x[:, : len(terms)], theta), regression.combine(z[:, : len(terms)], theta)
+    ones = np.full(len(effort), rms(effort))
+    for course, along in _over_time(parts):
+        for k, name in enumerate(terms):
+            if _has_sides(x[:, k], along):
+                yield _Look(name, course, x[:, k] * along, z[:, k] * along, float(theta[k]), CHANCE)
+        yield _Look(GAIN, course, effort * along, told * along, 1.0, CHANCE_WHOLE)
+        yield _Look(FORCE, course, ones * along, ones * along, 0.0, CHANCE_WHOLE)
+    yield _Look(GAIN, SIGN, np.abs(effort), np.abs(told), 1.0, CHANCE_WHOLE)
+    yield _Look(GAIN, "with its size", effort * _level(told), told * _level(told), 1.0, CHANCE_WHOLE)
+    for course, along in _over_place(parts):
+        yield _Look(GAIN, course, effort * along, told * along, 1.0, CHANCE_WHOLE)
+    for course, along in _over_motion(parts):
+        for k, name in enumerate(terms):
+            is_looked_at = name == "mass" or (course == SPEED and name.startswith("viscous"))
+            if is_looked_at and _has_sides(x[:, k], along):
+                yield _Look(name, course, x[:, k] * along, z[:, k] * along, float(theta[k]), CHANCE_WHOLE)
+
+
+def _has_sides(column: Values, along: Values) -> bool:
+    """True where both sides of a course tell enough of a constant."""
+    power = column**2
+    return SIDE < float(power[along > 0.0].sum()) / max(float(power.sum()), 1e-300) < 1.0 - SIDE
+
+
+def _over_time(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
     """Courses over each log, shape (m,), with what they are called."""
-    places = [2.0 * p.motion.rows / len(p.run.position) - 1.0 for p in parts]
+    along = np.concatenate([2.0 * p.motion.rows / len(p.run.position) - 1.0 for p in parts])
+    yield "steadily along the log", along
+    if 0.1 < float(np.mean(along > 0.0)) < 0.9:
+        yield "about 50% of the way along the log", np.where(along > 0.0, 1.0, -1.0)
+
+
+def _over_motion(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
+    """Courses with what the axis does, by the instruments, shape (m,)."""
+    velocity, acceleration = (
+        np.concatenate([getattr(p.ideal, name) for p in parts]) for name in ("velocity", "acceleration")
+    )
+    yield "with the direction", np.sign(velocity)
+    yield "from braking to speeding up", np.sign(velocity * acceleration)
+    yield SPEED, _level(velocity)
+    yield "with the acceleration", _level(acceleration)
+
+
+def _over_place(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
+    """Courses over the travel of each log, shape (m,)."""
+    places: list[Values] = []
+    for p in parts:
+        low, high = float(p.run.position.min()), float(p.run.position.max())
+        places.append(2.0 * (p.ideal.position - low) / max(high - low, 1e-300) - 1.0)
     along = np.concatenate(places)
-    yield "steadily", along
-    for moment in STEPS:
-        if min(float(np.mean(along > moment)), float(np.mean(along <= moment))) > 0.1:
-            yield f"about {0.5 + 0.5 * moment:.0%} of the way", np.where(along > moment, 1.0, -1.0)
+    yield "from end to end of the travel", along
+    yield "from the middle to the ends of the travel", 2.0 * np.abs(along) - 1.0
 
 
-def widen(fit: regression.Fit, changes: Sequence[Change]) -> None:
+def _level(values: Values) -> Values:
+    """Sizes from -1 for nothing to 1 for the largest."""
+    sizes = np.abs(values)
+    return np.clip(2.0 * sizes / max(float(np.quantile(sizes, 0.98)), 1e-300) - 1.0, -1.0, 1.0)
+
+
+def widen(parts: Sequence[regression.Prepared], fit: regression.Fit, changes: Sequence[Change]) -> None:
     """Let the covariance of a fit carry slight changes: a constant anywhere between both ends."""
+    top = float(np.quantile(np.abs(np.concatenate([p.ideal.velocity for p in parts])), 0.98))
     for change in changes:
-        k = fit.names.index(change.name)
-        fit.covariance[k, k] += change.amplitude**2 / 3.0
+        for k, name in enumerate(equations.terms_of(fit.model)):
+            fit.covariance[k, k] += _side(change, name, float(fit.values[k]), rms(fit.effort), top) ** 2 / 3.0
+
+
+def _side(change: Change, name: str, value: float, effort: float, top: float) -> float:
+    """By how much a change leaves a constant open to each side."""
+    kind, _, way = change.name.partition(".")
+    is_force = name.startswith(("coulomb", "offset"))
+    if change.name == GAIN:
+        return change.amplitude * value
+    if change.name == FORCE:
+        return change.amplitude * effort * is_force
+    # Straight lines through the slow and the fast half of a parabola differ so where they meet the standstill.
+    if change.course == SPEED and kind == "viscous" and name == f"coulomb{'.' if way else ''}{way}":
+        return 0.5 * change.amplitude * top
+    return change.amplitude * (name == change.name)

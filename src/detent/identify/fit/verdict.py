@@ -13,8 +13,8 @@ from detent.identify.fit.equations import Run
 from detent.identify.fit.estimate import Estimate, quantile, rms
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb, chosen_climb
-from detent.identify.fit.regression import Fit, Prepared, make_effort, residuals_of
-from detent.identify.fit.steadiness import SLIGHT, Change
+from detent.identify.fit.regression import Fit, Prepared, combine, lag_of, make_effort, residuals_of, solve
+from detent.identify.fit.steadiness import FORCE, GAIN, Change
 from detent.identify.fit.windows import Moved
 from detent.logs.differences import stepped
 from detent.logs.log import Action, Kind, Log, Severity, Values
@@ -35,6 +35,11 @@ COARSE = 0.1  # distance of the levels of an effort, in its size, from which it 
 UNTOLD = 0.06  # residual in this distance from which it does: a command that is one of few levels is exact
 SLOWEST = 0.1  # share of the top speed from which an axis moves
 FEWEST_BESIDE = 20  # zeros in motion, and different values beside the gap about them, from which small ones are gone
+FEWEST_UPDATES, LONGEST_HELD = 20, 0.04  # updates of a signal, and the time between two [s], by which it is held
+# Deviation of a position from its reference that a course of time explains, over the travel, and over what is left
+# beside it, from which on the position is not that of the loop; the share of the way by which a loop may stay behind
+# and still follows; and rows that are compared.
+LEAVES, BY_FAR, FOLLOWS, FEWEST_COMPARED, MOST_COMPARED = 0.004, 1.2, 0.1, 200, 20_000
 LASTING = 0.9  # correlation of neighbouring residuals from which the model misses something that lasts
 WORST_LASTING = 0.05  # error of the prediction from which that matters
 # Error of simulations over the travel: of half a second and more, as a rule; of any of these, and of the free run.
@@ -53,6 +58,7 @@ _DIRT: dict[Kind, tuple[str, str]] = {
     Kind.LOST_SIGN: ("lost sign", "record the signal with its sign"),
     Kind.COPIED: ("copied column", "record what the encoder says"),
     Kind.DROPPED_ROWS: ("lost rows", "record the time of each row with the row"),
+    Kind.DRIFTING_CLOCK: ("clock drifts", "record time and rows by one clock"),
 }
 
 
@@ -98,6 +104,10 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
     if any(f.kind is Kind.REPEATED_STAMPS and f.action is Action.INTERPOLATED for f in log.findings):
         text = f"{log.name}: time stamps are coarser than the rows"
         yield Refusal("coarse time", text, "record the time of each row to a tenth of a period", ("delay",))
+    for what in ("position", run.effort_name):
+        if 1 < (rows := held_rows(log.signals[what])) <= LONGEST_HELD / run.step:
+            text = f"{log.name}: {what} is another in every {rows}th row only: how old it is in the others is not known"
+            yield Refusal("coarse time", text, "record each signal as often as the rows are written", ("delay",))
     if gone := _small_values_gone(log.signals[run.effort_name], log.signals["position"]):
         text = f"{log.name}: {run.effort_name} is never between 0 and {gone:.3g} {run.effort_unit}, and 0 in motion"
         yield Refusal("small values are gone", text, "record the effort without a threshold below which it counts as 0")
@@ -110,10 +120,22 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
     if behind > MOST_LEFT_BEHIND:
         text = f"{log.name}: the reference covers {behind:.0%} of its travel while the position does not change"
         yield Refusal("stuck signal", text, "check the encoder, its cable and the drive enable, and record again")
+    if left := _leaves_reference(run):
+        text = f"{log.name}: the position leaves its reference by {left:.1%} of its travel along the log, as no loop does"
+        record = "look for a coupling that slips, counts that are lost, a scale that changes"
+        yield Refusal("position leaves its reference", text, record)
     saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), _share_at_ends(run, runs))
     if saturated > MOST_SATURATED:
         text = f"{log.name}: {run.effort_name} or position is at its limit in {saturated:.0%} of the rows"
         yield Refusal("saturated", text, "record slower or smaller moves that stay within the limit")
+
+
+def held_rows(values: Values) -> int:
+    """In every how many rows a signal is updated; 1 where it is in each, or in no such order."""
+    between = np.diff(np.flatnonzero(np.diff(values)))
+    if len(between) < FEWEST_UPDATES:
+        return 1
+    return int(np.gcd.reduce(between))
 
 
 def _small_values_gone(effort: Values, position: Values) -> float:
@@ -146,6 +168,27 @@ def _share_left_behind(run: Run) -> float:
     way = np.abs(np.diff(run.reference[:whole].reshape(-1, count), axis=1)).sum(axis=1)
     total = float(way.sum())
     return float(way[still].sum()) / total if total > 0.0 else 0.0
+
+
+def _leaves_reference(run: Run) -> float:
+    """By how much a position that follows its reference leaves it along a log, over the travel; 0 where it does not."""
+    if run.reference is None:
+        return 0.0
+    lag = lag_of(run.reference, run)
+    rows = np.arange(lag, len(run.position), max((len(run.position) - lag) // MOST_COMPARED, 1))
+    asked, way = run.reference[rows - lag], float(np.ptp(run.reference))
+    if not way or len(rows) < FEWEST_COMPARED:
+        return 0.0
+    # A loop is behind by its velocity and its friction, and may reach for a share of the travel only, all along.
+    place, speed, along = asked / way, np.gradient(asked), np.linspace(-1.0, 1.0, len(rows))
+    usual = np.column_stack([np.ones(len(rows)), place, speed / max(float(np.abs(speed).max()), 1e-300), np.sign(speed)])
+    turned = np.where(along > 0.0, 1.0, -1.0)
+    more = np.column_stack([usual, along, turned, place * along, place * turned])
+    error = (run.position[rows] - asked) / way
+    follows = abs(float(solve(usual, usual, error)[1])) < FOLLOWS
+    by, rest = (float(np.std(error - combine(x, solve(x, x, error)))) for x in (usual, more))
+    left = math.sqrt(max(by**2 - rest**2, 0.0))
+    return left if follows and left > max(LEAVES, BY_FAR * rest) else 0.0
 
 
 def look_at_motion(runs: Sequence[Run], parts: Sequence[Prepared]) -> Iterator[Refusal]:
@@ -242,13 +285,11 @@ def _impossible(by_name: dict[str, Estimate], effort: float, top: float) -> Iter
 def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequence[Change]) -> Iterator[Refusal]:
     """Whether the fit is that of one axis whose signals belong to the same moments."""
     run, effort_as_recorded, shifted = parts[0].run, make_effort(parts, 0.0), fit.effort
-    large = [change for change in changes if change.share > SLIGHT]
+    large = [change for change in changes if change.is_large]
     if large:
         most = max(large, key=lambda change: change.share)
-        ends = f"{most.mean - most.amplitude:.4g} to {most.mean + most.amplitude:.4g} {run.unit(most.name)}"
-        text = f"{most.name} changes {most.course} along the log, from {ends}: it is not of one axis and one effort"
-        record = "look for a load put on, an offset or gain of the sensor, a clock that drifts; identify parts alone"
-        yield Refusal("changes along the log", text, record)
+        subject = "changes with the motion" if most.is_of_motion else "changes along the log"
+        yield Refusal(subject, *_told(run, most, fit))
     delay, step = 1e3 * fit.value("delay"), 1e3 * run.step
     half = 1e3 * quantile(float(fit.degrees[fit.names.index("delay")])) * fit.error("delay")
     is_known = half < WIDEST_DELAY * step
@@ -274,6 +315,18 @@ def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequ
             "look for a filter, a coarse sensor, or friction that depends on the place; record on one axis at a time"
         )
         yield Refusal("model does not explain the log", text, record)
+
+
+def _told(run: Run, change: Change, fit: Fit) -> tuple[str, str]:
+    """A change in words, and what to look for."""
+    unit = {GAIN: "times", FORCE: run.effort_unit}.get(change.name) or run.unit(change.name)
+    size = rms(fit.effort) if change.name == FORCE else 1.0
+    ends = f"{size * (change.mean - change.amplitude):.4g} to {size * (change.mean + change.amplitude):.4g} {unit}"
+    text = f"{change.name} changes {change.course}, from {ends}: it is not of one axis and one effort"
+    if not change.is_of_motion:
+        what = "a load put on, an offset or gain of the sensor, a clock that drifts"
+        return text, f"look for {what}; identify parts alone"
+    return text, "look for an amplifier that is not even, a filter, a limit, a coarse sensor of the place"
 
 
 def look_at_windows(run: Run, moved: Sequence[Moved], names: Collection[str]) -> Iterator[Refusal]:

@@ -7,51 +7,89 @@ from tests.log_rig import make_log
 from detent.identify.fit.equations import make_run
 from detent.identify.fit.identification import choose_windows, identify
 from detent.identify.fit.regression import fit_equations
-from detent.identify.fit.steadiness import changes_of, widen
+from detent.identify.fit.steadiness import GAIN, SIGN, SLIGHT, SPEED, Change, changes_of, widen
 
 T = np.arange(16000) * 1e-3
 NAMES = ("mass", "coulomb", "offset", "viscous")
 
 
-def log(load=0.0, offset=0.0, seed=1):
-    """An axis of 2 kg that carries a load from the middle on, its force with an offset that grows."""
+def log(load=0.0, offset=0.0, seed=1, measured=lambda force, t: force):
+    """An axis of 2 kg that carries a load from the middle on, its force with an offset that grows, as measured."""
     w = 2 * np.pi * np.array([0.23, 0.61, 1.3])
     angle, sizes = np.outer(T, w) + np.array([0.3, 1.1, 2.0]), np.array([0.06, 0.025, 0.008])
     x, v, a = np.sin(angle) @ sizes, np.cos(angle) @ (sizes * w), -np.sin(angle) @ (sizes * w**2)
     mass = 2.0 + load * (np.arange(len(T)) > len(T) // 2)
     noise = 0.02 * np.random.default_rng(seed).normal(size=len(T))
     force = mass * a + 1.6 * np.sign(v) + 6.0 * v + offset * np.linspace(-1, 1, len(T)) + noise
-    return make_log(T, position=x, force=force)
+    return make_log(T, position=x, force=measured(force, np.linspace(-1, 1, len(T))))
 
 
 def changes(made):
     parts = choose_windows([make_run(made)])
     fit = fit_equations(parts, NAMES)
-    return fit, {change.name: change for change in changes_of(parts, fit)}
+    return parts, fit, {change.name: change for change in changes_of(parts, fit)}
 
 
 def test_constants_that_stay():
-    assert [changes(log(seed=seed))[1] for seed in range(5)] == [{}] * 5
+    assert [changes(log(seed=seed))[2] for seed in range(5)] == [{}] * 5
 
 
 def test_a_load_put_on():
-    _, found = changes(log(load=0.5))
+    _, _, found = changes(log(load=0.5))
     assert found["mass"].amplitude == pytest.approx(0.25, rel=0.1)
-    assert found["mass"].course == "about 50% of the way"
+    assert found["mass"].course == "about 50% of the way along the log"
     assert found["mass"].share == pytest.approx(0.25 / 2.25, rel=0.1)
 
 
 def test_an_offset_that_drifts():
-    _, found = changes(log(offset=0.4))
+    _, _, found = changes(log(offset=0.4))
     assert found["offset"].amplitude == pytest.approx(0.4, rel=0.1)
-    assert found["offset"].course == "steadily"
+    assert found["offset"].course == "steadily along the log"
     refused = identify([log(offset=0.4)])
     assert refused.verdict == "refused"
     assert "changes along the log" in {r.subject for r in refused.refusals}
 
 
+def test_a_gain_that_changes_with_time_or_sign():
+    """All constants change alike: together they tell what none of them does alone."""
+    for measured, course, size in (
+        (lambda force, t: force * (1.0 + 0.1 * t), "steadily along the log", 0.1),
+        (lambda force, t: force * np.where(t > 0.0, 1.1, 0.9), "about 50% of the way along the log", 0.1),
+        (lambda force, _: np.where(force > 0.0, 1.2 * force, force), "with its sign", 0.1 / 1.1),
+    ):
+        made = log(measured=measured)
+        _, _, found = changes(made)
+        assert found[GAIN].course == course
+        assert abs(found[GAIN].amplitude) == pytest.approx(size, rel=0.15)
+        (refusal,) = [r for r in identify([made]).refusals if r.subject.startswith("changes")]
+        assert refusal.constants == ()
+
+
+def test_what_a_change_with_the_motion_may_be():
+    """A mass that a coarse sensor blurs holds in its mean; friction is no straight line of the speed."""
+    shares = {"mass": 0.1, GAIN: 0.1, "viscous": np.inf}
+    for name, most in shares.items():
+        small, large = (Change(name, 1.0, share, share, SPEED) for share in (0.99 * min(most, 5.0), 1.01 * most))
+        assert not small.is_large
+        assert large.is_large == (most < np.inf)
+        assert not Change(GAIN, 1.0, 0.99 * SLIGHT, 0.99 * SLIGHT, SIGN).is_large
+        assert Change(GAIN, 1.0, 1.01 * SLIGHT, 1.01 * SLIGHT, SIGN).is_large
+        assert Change(name, 1.0, 1.01 * SLIGHT, 1.01 * SLIGHT, "steadily along the log").is_large
+
+
 def test_a_slight_change_widens_the_limits():
-    fit, found = changes(log(load=0.06))
+    parts, fit, found = changes(log(load=0.06))
     before = fit.error("mass")
-    widen(fit, list(found.values()))
+    widen(parts, fit, [found["mass"]])
     assert fit.error("mass") == pytest.approx(np.hypot(before, found["mass"].amplitude / np.sqrt(3)))
+
+
+def test_friction_that_bends_widens_both_constants_of_its_direction():
+    """Chords of a parabola: half of the change of the slope at the top speed is what their ends at standstill differ."""
+    parts, fit, _ = changes(log())
+    before = [fit.error(name) for name in fit.names]
+    widen(parts, fit, [Change("viscous", 6.0, 0.6, 0.01, SPEED)])
+    top = float(np.quantile(np.abs(parts[0].ideal.velocity), 0.98))
+    sides = {"viscous": 0.6, "coulomb": 0.3 * top}
+    for name, error in zip(fit.names, before, strict=True):
+        assert fit.error(name) == pytest.approx(np.hypot(error, sides.get(name, 0.0) / np.sqrt(3)))

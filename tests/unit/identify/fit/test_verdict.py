@@ -15,6 +15,7 @@ from detent.identify.fit.regression import prepare
 from detent.identify.fit.verdict import (
     Refusal,
     compare_methods,
+    held_rows,
     look_at_constants,
     look_at_log,
     look_at_motion,
@@ -102,6 +103,17 @@ def test_an_effort_whose_small_values_are_gone_is_refused():
     assert look(force=least * np.round(force / least)) == []
     off = np.where(np.arange(len(force)) < 0.02 * len(force), 0.0, force)
     assert look(force=off) == []
+
+
+def test_the_age_of_a_signal_that_is_held_is_not_known():
+    """Updated in every 5th row; in each; in steps of a second, which excite; in none of these orders."""
+    force = Recorder(seconds=2.0).columns()[3]
+    k = np.arange(len(force))
+    (refusal,) = look(force=force[k // 5 * 5])
+    assert refusal.constants == ("delay",)
+    assert "force is another in every 5th row only" in refusal.text
+    assert [held_rows(force[rows]) for rows in (k, k // 5 * 5, k // 3 * 3, k - k % (2 + k // 50 % 2))] == [1, 5, 3, 1]
+    assert look(force=force[k // 200 * 200]) == []
 
 
 def test_a_position_that_stays_behind_its_reference_is_refused():

@@ -8,18 +8,20 @@ from detent.identify.fit.constants import constants_of
 from detent.identify.fit.equations import make_run
 from detent.identify.fit.identification import choose_windows, identify
 from detent.identify.fit.regression import fit_equations
-from detent.identify.fit.windows import MOVED, Moved, moved_by_windows, widened
+from detent.identify.fit.windows import MOST_OUT, MOVED, Moved, moved_by_windows, odd_windows, widened, without
 
 T = np.arange(16000) * 1e-3
 TERMS = ("mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
 
 
-def log(wave=0.0, seed=1):
-    """An axis of 2 kg, and a sensor whose error goes up and down every 2 mm."""
+def log(wave=0.0, seed=1, pushed=()):
+    """An axis of 2 kg that is pushed at some samples, and a sensor whose error goes up and down every 2 mm."""
     w = 2 * np.pi * np.array([0.23, 0.61, 1.3])
     angle, sizes = np.outer(T, w) + np.array([0.3, 1.1, 2.0]), np.array([0.06, 0.025, 0.008])
     x, v, a = np.sin(angle) @ sizes, np.cos(angle) @ (sizes * w), -np.sin(angle) @ (sizes * w**2)
     force = 2.0 * a + 1.6 * np.sign(v) + 6.0 * v + 0.02 * np.random.default_rng(seed).normal(size=len(T))
+    for at in pushed:
+        force[at : at + 20] += 1.5
     return make_log(T, position=x + wave * np.sin(2 * np.pi * x / 2e-3), force=force)
 
 
@@ -42,7 +44,7 @@ def test_a_sensor_that_is_not_even_moves_them():
 
 
 def test_what_they_move_is_refused_with_both_values():
-    found = identify([log(wave=3e-5)])
+    found = identify([log(wave=2e-5)])
     assert found.verdict != "trusted"
     refused = [r for r in found.refusals if r.subject == "depends on the window"]
     assert all("by wider ones" in r.text for r in refused)
@@ -68,3 +70,36 @@ def test_a_slight_change_widens_the_interval():
     assert not Moved("mass", mass, 1.011 * mass, 0.04).is_slight
     assert widened(constants, [slight]).errors[0] == pytest.approx(np.hypot(error, 5e-3 * mass))
     assert widened(constants, []).errors[0] == error
+
+
+def test_what_pushes_for_a_moment_is_left_out_and_named():
+    pushed = (2000, 6100, 9200)
+    found, clean = identify([log(pushed=pushed)]), identify([log()])
+    (told,) = [note for note in found.notes if "left out" in note]
+    named = [int(one.partition("-")[0]) for one in told.partition("rows ")[2].partition(":")[0].split(", ")]
+    assert len(named) == len(pushed)
+    assert np.allclose(named, pushed, atol=40)
+    assert not any("left out" in note for note in clean.notes)
+    for one, other in zip(found.trusted, clean.trusted, strict=True):
+        assert one.holds(other.value)
+        assert one.half < 1.3 * other.half
+
+
+def test_what_is_common_belongs_to_the_axis():
+    pushed = range(200, 15000, 300)
+    parts = choose_windows([make_run(log(pushed=pushed))])
+    fit = fit_equations(parts, TERMS)
+    sizes = np.abs(fit.residual)
+    assert np.mean(sizes > 8.0 * 1.4826 * np.median(sizes)) > MOST_OUT
+    assert [len(rows) for rows in odd_windows(parts, fit)] == [0]
+
+
+def test_no_window_is_left_that_holds_the_middle_of_an_odd_one():
+    (part,) = choose_windows([make_run(log())])
+    odd = part.motion.rows[[100, 700]]
+    left = without(part, odd)
+    reach = part.ideal.kernel.half if part.instruments == "position" else part.motion.kernel.half
+    assert np.abs(left.motion.rows[:, None] - odd).min() > reach
+    assert len(left.motion.velocity) == len(left.ideal.velocity) == len(left.motion.rows) < len(part.motion.rows)
+    assert not left.run.usable[odd].any()
+    assert part.run.usable[odd].all()
