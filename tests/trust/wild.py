@@ -19,11 +19,14 @@ from detent.identify.fit.identification import Identification, identify
 from detent.logs.read_log import read_log
 from tests.places import DATA
 from tests.trust.faults import FAULTS, Table
+from tests.trust.harder_faults import HARDER
+from tests.trust.more_faults import MORE
 from tests.trust.plants import make_case
 from tests.trust.table import table
 from tests.trust.unseen import UNSEEN
 
-KINDS = (*FAULTS, *UNSEEN)
+CHOSEN = (*FAULTS, *MORE, *HARDER)
+KINDS = (*CHOSEN, *UNSEEN)
 """Every kind, by its number."""
 
 SIMULATED = (7001, 7002, 7003, 7005)
@@ -197,7 +200,7 @@ def page(outcomes: Sequence[Outcome]) -> str:
     kinds = len({o.fault for o in outcomes})
     text = HEAD.format(kinds=kinds, logs=f"{', '.join(logs[:-1])} and {logs[-1]}")
     titles = ("Kinds that rules were chosen with", "Kinds that they were not chosen with")
-    for title, part in zip(titles, (FAULTS, UNSEEN), strict=True):
+    for title, part in zip(titles, (CHOSEN, UNSEEN), strict=True):
         names = [fault.name for fault in part]
         text += f"\n## {title}\n\n{fault_table([o for o in outcomes if o.fault in names])}"
     return text

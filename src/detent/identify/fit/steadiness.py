@@ -32,6 +32,7 @@ CHANCE, CHANCE_WHOLE = 2e-5, 2.5e-4
 ROWS_EACH = 8  # windows for each column, at least
 SLIGHT = 0.03  # change to each side, over the mass or in parts of the effort, up to which it only widens the limits
 MOST_OF_MOTION = 0.1  # the same of a mass or a gain that changes with the motion, where it has a mean
+MOST_HALVES = 8  # half waves of a course over a log, at most
 SIDE = 0.15  # share of what tells a constant that each side of a course holds, at least
 OWN = 1e-3  # part of a column that no other explains, from which on it is one of its own
 SPEED, SIGN = "with the speed", "with its sign"
@@ -51,8 +52,8 @@ class Change:
     @property
     def is_large(self) -> bool:
         """True where it is more than an interval should carry."""
-        # Friction is no straight line of the speed anyway, and of a mass that sensors are too coarse for, the mean holds.
-        if not self.is_of_motion or (self.name == GAIN and self.course == SIGN):
+        # Friction is no straight line of the speed anyway; where sensors are too coarse for a mass, its mean holds.
+        if not self.is_of_motion or self.course == SIGN:
             return self.share > SLIGHT
         return self.name in {"mass", GAIN} and self.share > MOST_OF_MOTION
 
@@ -119,6 +120,7 @@ def _looks(parts: Sequence[regression.Prepared], fit: regression.Fit, x: Values,
         for k, name in enumerate(terms):
             if _has_sides(x[:, k], along):
                 yield _Look(name, course, x[:, k] * along, z[:, k] * along, float(theta[k]), CHANCE)
+    for course, along in (*_over_time(parts), *_up_and_down(parts)):
         yield _Look(GAIN, course, effort * along, told * along, 1.0, CHANCE_WHOLE)
         yield _Look(FORCE, course, ones * along, ones * along, 0.0, CHANCE_WHOLE)
     yield _Look(GAIN, SIGN, np.abs(effort), np.abs(told), 1.0, CHANCE_WHOLE)
@@ -140,10 +142,22 @@ def _has_sides(column: Values, along: Values) -> bool:
 
 def _over_time(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
     """Courses over each log, shape (m,), with what they are called."""
-    along = np.concatenate([2.0 * p.motion.rows / len(p.run.position) - 1.0 for p in parts])
+    along = _time_of(parts)
     yield "steadily along the log", along
     if 0.1 < float(np.mean(along > 0.0)) < 0.9:
         yield "about 50% of the way along the log", np.where(along > 0.0, 1.0, -1.0)
+
+
+def _up_and_down(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
+    """Courses that come and go over each log, shape (m,), as what drifts and is not one axis does."""
+    along = _time_of(parts)
+    for halves in range(2, MOST_HALVES + 1):
+        yield f"up and down along the log, in {halves} half waves", np.cos(0.5 * np.pi * halves * (along + 1.0))
+
+
+def _time_of(parts: Sequence[regression.Prepared]) -> Values:
+    """Time of the windows, from -1 at the begin of each log to 1 at its end."""
+    return np.concatenate([2.0 * p.motion.rows / len(p.run.position) - 1.0 for p in parts])
 
 
 def _over_motion(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:

@@ -25,6 +25,7 @@ MOST_SATURATED = 0.3  # share of saturated samples, at most
 MOST_STUCK = 0.05  # share of samples with a stuck signal, at most
 MOST_LEFT_BEHIND = 0.6  # share of the reference's way while the position stands still, at most: friction may hold it
 WIDEST_MASS = 0.2  # half of the interval of the mass over the mass, at most
+UNTOLD_FORCE = 0.1  # effort that a mass which is not known leaves open, over the effort, at most
 WIDEST_FORCE = 0.15  # half of the interval of a friction or a weight over the effort that moves the axis, at most
 SAME_SPEED = 0.6  # tenth over ninth decile of the speeds of a direction, from which on they count as one speed
 WIDEST_DELAY = 10.0  # half of the interval of the delay, in samples, at most
@@ -35,6 +36,7 @@ COARSE = 0.1  # distance of the levels of an effort, in its size, from which it 
 UNTOLD = 0.06  # residual in this distance from which it does: a command that is one of few levels is exact
 SLOWEST = 0.1  # share of the top speed from which an axis moves
 FEWEST_BESIDE = 20  # zeros in motion, and different values beside the gap about them, from which small ones are gone
+ROUNDED = 6  # digits to which ways from row to row, over the largest, are one and the same: straight lines were drawn
 FEWEST_UPDATES, LONGEST_HELD = 20, 0.04  # updates of a signal, and the time between two [s], by which it is held
 # Deviation of a position from its reference that a course of time explains, over the travel, and over what is left
 # beside it, from which on the position is not that of the loop; the share of the way by which a loop may stay behind
@@ -104,8 +106,11 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
     if any(f.kind is Kind.REPEATED_STAMPS and f.action is Action.INTERPOLATED for f in log.findings):
         text = f"{log.name}: time stamps are coarser than the rows"
         yield Refusal("coarse time", text, "record the time of each row to a tenth of a period", ("delay",))
-    for what in ("position", run.effort_name):
-        if 1 < (rows := held_rows(log.signals[what])) <= LONGEST_HELD / run.step:
+    ways = np.diff(log.signals["position"])
+    lines = np.round(ways / max(float(np.abs(ways).max(initial=0.0)), 1e-300), ROUNDED)
+    told_by = {"position": log.signals["position"], run.effort_name: log.signals[run.effort_name], "way": lines}
+    for what, values in told_by.items():
+        if 1 < (rows := held_rows(values)) <= LONGEST_HELD / run.step:
             text = f"{log.name}: {what} is another in every {rows}th row only: how old it is in the others is not known"
             yield Refusal("coarse time", text, "record each signal as often as the rows are written", ("delay",))
     if gone := _small_values_gone(log.signals[run.effort_name], log.signals["position"]):
@@ -121,7 +126,9 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
         text = f"{log.name}: the reference covers {behind:.0%} of its travel while the position does not change"
         yield Refusal("stuck signal", text, "check the encoder, its cable and the drive enable, and record again")
     if left := _leaves_reference(run):
-        text = f"{log.name}: the position leaves its reference by {left:.1%} of its travel along the log, as no loop does"
+        text = (
+            f"{log.name}: the position leaves its reference by {left:.1%} of its travel along the log, as no loop does"
+        )
         record = "look for a coupling that slips, counts that are lost, a scale that changes"
         yield Refusal("position leaves its reference", text, record)
     saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), _share_at_ends(run, runs))
@@ -181,7 +188,9 @@ def _leaves_reference(run: Run) -> float:
         return 0.0
     # A loop is behind by its velocity and its friction, and may reach for a share of the travel only, all along.
     place, speed, along = asked / way, np.gradient(asked), np.linspace(-1.0, 1.0, len(rows))
-    usual = np.column_stack([np.ones(len(rows)), place, speed / max(float(np.abs(speed).max()), 1e-300), np.sign(speed)])
+    usual = np.column_stack(
+        [np.ones(len(rows)), place, speed / max(float(np.abs(speed).max()), 1e-300), np.sign(speed)]
+    )
     turned = np.where(along > 0.0, 1.0, -1.0)
     more = np.column_stack([usual, along, turned, place * along, place * turned])
     error = (run.position[rows] - asked) / way
@@ -214,7 +223,8 @@ def look_at_constants(run: Run, constants: Constants, parts: Sequence[Prepared])
     velocity = np.concatenate([p.motion.velocity for p in parts])
     top = float(np.quantile(np.abs(velocity), 0.95))
     by_name = {e.name: e for e in constants.estimates(run)}
-    found = [*_not_told(run, by_name, effort, top, constants.bounded)]
+    acceleration = rms(np.concatenate([p.motion.acceleration for p in parts]))
+    found = [*_not_explained(by_name, effort, acceleration), *_not_told(run, by_name, effort, top, constants.bounded)]
     refused = {name for refusal in found for name in refusal.constants}
     found += [r for r in _one_speed(run, velocity, by_name) if not refused >= set(r.constants)]
     found += [_bounded(by_name[name]) for name in constants.bounded if name in by_name]
@@ -226,6 +236,15 @@ def _bounded(e: Estimate) -> Refusal:
     text = f"{e.name} {e.value:.4g} {e.unit} is an end of the range that was searched, not a value"
     record = "moves that show it" if e.name != "delay" else "effort and motion by one clock, unfiltered"
     return Refusal("at a bound", text, f"record {record}", (e.name,))
+
+
+def _not_explained(by_name: dict[str, Estimate], effort: float, acceleration: float) -> Iterator[Refusal]:
+    """A mass that is not known although the axis accelerates: something else takes the effort, and all are wrong."""
+    mass = by_name["mass"]
+    share = min(mass.half * acceleration / max(effort, 1e-300), 9.99)
+    if mass.high > 0.0 and not mass.half < WIDEST_MASS * mass.value and share > UNTOLD_FORCE:
+        text = f"mass {mass.value:.4g} +- {mass.half:.2g} {mass.unit}, which leaves {share:.0%} of the effort open"
+        yield Refusal("model does not explain the log", text, "look for what else drives the axis, a filter, a delay")
 
 
 def _not_told(
@@ -304,6 +323,9 @@ def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequ
     elif fit.instruments == "reference" and is_known and delay + half < -MOST_LATE * step:
         text = f"the effort follows the motion that it causes by {-delay:.3g} ms: it came late, or through a filter"
         yield Refusal("effort is late", text, record)
+    elif fit.instruments == "reference" and delay + half < -step:
+        text = f"{delay:.3g} ms: no effort acts before it is there by more than the time between two rows"
+        yield Refusal("effort is late", text, record, ("delay",))
     neighbours = residuals_of(fit).neighbours
     level, effort = level_of(run.effort), rms(run.effort)
     if level > COARSE * effort and rms(fit.residual) > UNTOLD * level:

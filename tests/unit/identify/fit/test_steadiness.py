@@ -13,7 +13,7 @@ T = np.arange(16000) * 1e-3
 NAMES = ("mass", "coulomb", "offset", "viscous")
 
 
-def log(load=0.0, offset=0.0, seed=1, measured=lambda force, t: force):
+def log(load=0.0, offset=0.0, seed=1, measured=lambda force, _: force):
     """An axis of 2 kg that carries a load from the middle on, its force with an offset that grows, as measured."""
     w = 2 * np.pi * np.array([0.23, 0.61, 1.3])
     angle, sizes = np.outer(T, w) + np.array([0.3, 1.1, 2.0]), np.array([0.06, 0.025, 0.008])
@@ -85,7 +85,7 @@ def test_a_slight_change_widens_the_limits():
 
 
 def test_friction_that_bends_widens_both_constants_of_its_direction():
-    """Chords of a parabola: half of the change of the slope at the top speed is what their ends at standstill differ."""
+    """Chords of a parabola: their ends at standstill differ by half of the change of the slope at the top speed."""
     parts, fit, _ = changes(log())
     before = [fit.error(name) for name in fit.names]
     widen(parts, fit, [Change("viscous", 6.0, 0.6, 0.01, SPEED)])
