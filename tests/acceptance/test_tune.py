@@ -6,7 +6,7 @@ import random
 import re
 import subprocess
 import sys
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -51,6 +51,7 @@ from detent.tune.batch import Limit, Question, chunks_of, draw, run_chunk, run_c
 from detent.tune.choice import Chooser
 from detent.tune.plants import Plants
 from detent.tune.standstill import look, standstill
+from detent.tune.tuned import Tuned
 from detent.tune.worst import worst, write_worst
 
 CASCADE = EXAMPLES / "cascade.toml"
@@ -303,8 +304,14 @@ def test_13_nothing_is_written_unasked_and_what_is_written_is_the_file_with_new_
         told.save(tmp_path / "other.toml")
 
 
+@cache
+def tuned_by_hand() -> Tuned:
+    """The example with gains found by hand, tuned: several tests look at it."""
+    return detent.load(CASCADE, BY_HAND).tune()
+
+
 def test_14_the_same_file_gives_the_same_gains_and_a_key_may_be_held():
-    one, other = (detent.load(CASCADE, BY_HAND).tune() for _ in range(2))
+    one, other = tuned_by_hand(), detent.load(CASCADE, BY_HAND).tune()
     assert json.dumps(one.to_dict()) == json.dumps(other.to_dict())
     for key, overrides in (("method.velocity_gain", ["method.velocity_gain=50 V*s/m"]), ("method.position_gain", [])):
         made = detent.load(CASCADE, (*BY_HAND, *overrides))
@@ -338,7 +345,7 @@ def test_a_choice_does_not_depend_on_the_last_bits(monkeypatch):
 @pytest.mark.compiled
 def test_12_a_move_and_a_push_before_and_after():
     """Time back within 5 um is seen by an encoder of 1 um: 131 ms here for the 139 ms of a program without counts."""
-    found = detent.load(CASCADE, BY_HAND).tune().values
+    found = tuned_by_hand().values
     rows = [moved_and_pushed({}), moved_and_pushed(found)]
     following, after_end, deflection, back = zip(*rows, strict=True)
     assert (following[0], after_end[0]) == (pytest.approx(38.9e-6, abs=1e-6), pytest.approx(28e-6, abs=1e-6))
