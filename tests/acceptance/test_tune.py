@@ -441,11 +441,10 @@ def test_feedforward_takes_what_is_known_of_its_constants():
 
 def test_28_check_cautions_the_gains_by_hand_and_not_those_of_tune():
     """Ms of the example as it was shipped is 2.22 at 344 Hz."""
-    by_hand_too = detent.load(CASCADE, BY_HAND)
-    (caution,) = by_hand_too.check().warnings
+    (caution,) = detent.load(CASCADE, BY_HAND).check().warnings
     assert (caution.name, caution.value) == ("Ms at the command", "2.22 at 344 Hz")
     assert detent.load(CASCADE).check().warnings == ()
-    found = by_hand_too.tune().values
+    found = tuned_by_hand().values
     stated = CascadeTuning(detent.load(CASCADE).spec).stated
     assert found == stated  # the packaged example has the gains of tune, all three digits
 
