@@ -48,7 +48,8 @@ demo: venv-base ## simulate the example print head printing a letter; say where 
 # Files go whole to one process per processor: what a file prepares is prepared once. They go in the order that
 # tests/conftest.py gives them, not by how many tests they hold: the longest have few.
 WHOLE_FILES := -n auto --dist loadfile --no-loadscope-reorder
-# MEASURED=yes: which lines the unit tests reach is written to these files on the way, for `make coverage`.
+# MEASURED=yes: which lines the unit tests reach is written to these files, for `make coverage`; it takes half as long
+# again for these tests, and spares doing them twice.
 REACHED     := .coverage.tests
 test: venv-test ## the tests, without those that take long
 	$(if $(MEASURED),rm -f $(REACHED).* && COVERAGE_FILE=$(REACHED) )$(PYTEST) $(if $(MEASURED),-p tests.measured) \
@@ -91,9 +92,9 @@ bench-smoke: venv-test ## run every benchmark once, without measuring
 	$(PYTEST) -m bench tests/bench --benchmark-disable $(WHOLE_FILES) $(PYTEST_ARGS)
 
 # Compiled code is invisible to coverage: the tests of the steps run as plain Python, but for those that simulate too
-# long. All other unit tests run compiled, and were looked on while all tests ran: where that was before the last edit,
-# they run again. Beside them the panel's of the specification, and the faces, processes of their own, with the tests of
-# their clients: they wait more than they compute.
+# long. All other unit tests run compiled, and coverage looks on while `make test` does them: where that was before the
+# last edit, it does them again. Beside the steps run the panel's tests of the specification, and the faces, processes
+# of their own, with the tests of their clients: these wait more than they compute.
 BLOCKS   := $(addprefix tests/unit/,control drive planning plant sensing)
 STEPS    := $(BLOCKS) $(addprefix tests/unit/,kernel $(addprefix operate/test_,drivers.py loop.py watchdog.py)) \
             $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py live*.py plant.py system*.py))
