@@ -48,8 +48,12 @@ demo: venv-base ## simulate the example print head printing a letter; say where 
 # Files go whole to one process per processor: what a file prepares is prepared once. They go in the order that
 # tests/conftest.py gives them, not by how many tests they hold: the longest have few.
 WHOLE_FILES := -n auto --dist loadfile --no-loadscope-reorder
+# MEASURED=yes: which lines the unit tests reach is written to these files, for `make coverage`; it takes half as long
+# again for these tests, and spares doing them twice.
+REACHED     := .coverage.tests
 test: venv-test ## the tests, without those that take long
-	$(PYTEST) $(WHOLE_FILES) -p no:benchmark $(PYTEST_ARGS)
+	$(if $(MEASURED),rm -f $(REACHED).* && COVERAGE_FILE=$(REACHED) )$(PYTEST) $(if $(MEASURED),-p tests.measured) \
+	    $(WHOLE_FILES) -p no:benchmark $(PYTEST_ARGS)
 
 test-wide: venv-test ## thousands of numbered cases, dozens of logs, other processors' kernels
 	$(PYTEST) -m "wide and not long" $(WHOLE_FILES) -p no:benchmark $(PYTEST_ARGS)
@@ -88,29 +92,27 @@ bench-smoke: venv-test ## run every benchmark once, without measuring
 	$(PYTEST) -m bench tests/bench --benchmark-disable $(WHOLE_FILES) $(PYTEST_ARGS)
 
 # Compiled code is invisible to coverage: the tests of the steps run as plain Python, but for those that simulate too
-# long; all others run compiled, as in `make test`, and with them the panel's of the specification. Two processes at the
-# same time, with about as much to do. Coverage slows Python down: what tests/property draws a hundred times reaches
-# few lines that the unit tests do not.
+# long. All other unit tests run compiled, and coverage looks on while `make test` does them: where that was before the
+# last edit, it does them again. Beside the steps run the panel's tests of the specification, and the faces, processes
+# of their own, with the tests of their clients: these wait more than they compute.
 BLOCKS   := $(addprefix tests/unit/,control drive planning plant sensing)
 STEPS    := $(BLOCKS) $(addprefix tests/unit/,kernel $(addprefix operate/test_,drivers.py loop.py watchdog.py)) \
             $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py live*.py plant.py system*.py))
-WHOLE    := $(addprefix tests/unit/,methods identify cli export tune)
 PANEL    := _49_ or _50_ or _51_ or _52_ or _53_
-SEEN     := not long and not wide and not bench and not process
-COVER    := $(BIN)/python -m coverage run -m pytest $(PYTEST_ARGS)
-# The faces are processes of their own, which are measured with their clients' tests.
-FACES    := $(BIN)/python -m coverage run --rcfile=$(CURDIR)/tests/faces.coveragerc -m pytest $(PYTEST_ARGS) \
-            -m "not long and not wide" -k "not test_29 and not test_31" \
-            tests/acceptance/test_faces.py
-coverage: venv-test ## which lines and branches the unit tests reach
-	rm -f .coverage.faces.*
-	(COVERAGE_FILE=.coverage.whole $(COVER) -m "$(SEEN)" $(WHOLE) && \
-	    COVERAGE_FILE=$(CURDIR)/.coverage.faces $(FACES)) & whole=$$!; \
-	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.steps $(COVER) -m "$(SEEN) and not compiled" $(STEPS); steps=$$?; \
-	COVERAGE_FILE=.coverage.rest $(COVER) -m "$(SEEN)" tests/unit $(addprefix --ignore=,$(WHOLE) $(BLOCKS)); rest=$$?; \
-	COVERAGE_FILE=.coverage.panel $(COVER) -m "$(SEEN)" -k "$(PANEL)" tests/acceptance/test_live.py; panel=$$?; \
-	wait $$whole && test $$steps = 0 && test $$rest = 0 && test $$panel = 0
-	$(BIN)/python -m coverage combine .coverage.whole .coverage.steps .coverage.rest .coverage.panel .coverage.faces.*
+SEEN     := not long and not wide and not bench
+COVER    := $(BIN)/python -m coverage run
+$(REACHED).gw0: $(shell find src/detent tests -name '*.py')
+	$(MAKE) test MEASURED=yes
+coverage: venv-test $(REACHED).gw0 ## which lines and branches the unit tests reach
+	rm -f .coverage.faces.* .coverage.steps.*
+	(COVERAGE_FILE=$(CURDIR)/.coverage.faces $(COVER) --rcfile=$(CURDIR)/tests/faces.coveragerc \
+	        -m pytest -m "$(SEEN)" -k "not test_29 and not test_31" tests/acceptance/test_faces.py $(PYTEST_ARGS) && \
+	    COVERAGE_FILE=.coverage.panel $(COVER) \
+	        -m pytest -m "$(SEEN) and not process" -k "$(PANEL)" tests/acceptance/test_live.py $(PYTEST_ARGS)) & beside=$$!; \
+	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.steps $(PYTEST) -p tests.measured $(WHOLE_FILES) -p no:benchmark \
+	    -m "$(SEEN) and not compiled and not process" $(STEPS) $(PYTEST_ARGS); steps=$$?; \
+	wait $$beside && test $$steps = 0
+	$(BIN)/python -m coverage combine $(REACHED).* .coverage.steps.* .coverage.panel .coverage.faces.*
 	$(BIN)/python -m coverage report
 
 lint: venv-dev ## ruff: rules and layout
@@ -138,4 +140,4 @@ figures: venv-test ## draw the figures of the documentation anew, and replace th
 check: lint types imports test docs bench-smoke ## all that a change must pass, but for the long tests
 
 clean: ## remove the environment and everything made
-	rm -rf $(VENV) $(VENV).lock $(LOWEST) docs/_build runs .pytest_cache .hypothesis .benchmarks .ruff_cache .import_linter_cache .coverage htmlcov
+	rm -rf $(VENV) $(VENV).lock $(LOWEST) docs/_build runs .pytest_cache .hypothesis .benchmarks .ruff_cache .import_linter_cache .coverage* htmlcov

@@ -1,5 +1,7 @@
 """`detent live` in processes of its own, with people who watch, flood, and stay for long."""
 
+import contextlib
+import io
 import json
 import os
 import shutil
@@ -12,11 +14,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 import detent
+from detent.cli import main
 from tests.live_panel import Browser, Socket
 
 STARTED: list[subprocess.Popen[str]] = []  # also by a test that fails
@@ -197,3 +201,18 @@ def soak(folder: Path, warm: float, seconds: float) -> dict[str, float]:
 def run(*args: str) -> subprocess.CompletedProcess[str]:
     """A command in another process."""
     return subprocess.run([sys.executable, "-m", "detent", *args], capture_output=True, text=True, check=False)
+
+
+def connect(*args: str) -> subprocess.CompletedProcess[str]:
+    """`detent connect` in this process, where all that it imports is loaded: the axis runs in another anyway."""
+    out, err, status = io.StringIO(), io.StringIO(), 0
+    with (
+        patch.object(sys, "argv", ["detent", "connect", *args]),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        try:
+            main()
+        except SystemExit as left:
+            status = int(left.code or 0)
+    return subprocess.CompletedProcess(args, status, out.getvalue(), err.getvalue())

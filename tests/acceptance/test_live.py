@@ -2717,21 +2717,21 @@ def test_54_56_an_axis_runs_until_it_is_interrupted_and_others_move_it(
         at = axis.position
         axis.move_by("5 mm")
         assert axis.position == pytest.approx(at + 5e-3, abs=1e-4)
-    told = live_processes.run("connect", file, "--json")
+    told = live_processes.connect(file, "--json")
     assert told.returncode == 0
     status = json.loads(told.stdout)["status"]
     assert (status["state"], status["client"]) == ("operation enabled", 0)
     assert status["position"] == pytest.approx(at + 5e-3, abs=1e-4)
-    refused = live_processes.run("connect", file, "move_to", "7 m")
+    refused = live_processes.connect(file, "move_to", "7 m")
     assert (refused.returncode, refused.stdout) == (1, "")
     assert "31" in refused.stderr
-    assert live_processes.run("connect", file, "move_to", "7 V").returncode == 2
+    assert live_processes.connect(file, "move_to", "7 V").returncode == 2
     with detent.connect(file) as axis:  # interrupted while it moves: at rest before it ends
         axis.do("jog", "50 mm/s", wait=False)
         ended = running.ended()
     assert ended["rests"] is True
     assert ended["state"] == "switch on disabled"
-    assert live_processes.run("connect", file).returncode == 1
+    assert live_processes.connect(file).returncode == 1
 
 
 @in_wall_time
@@ -2824,13 +2824,13 @@ def test_46_the_position_table_from_a_second_terminal(folder: Path) -> None:
     file = folder / "places.toml"
     shutil.copy(folder / "slide.toml", file)
     live = live_processes.Running(file, "--period", "10 ms")
-    assert "No positions yet" in live_processes.run("connect", str(file), "positions").stdout
-    assert live_processes.run("connect", str(file), "teach", "3").stdout.startswith("3: 20 mm, 4000 counts")
-    assert live_processes.run("connect", str(file), "edit", "load", "0.2 in").returncode == 0
-    table = json.loads(live_processes.run("connect", str(file), "positions", "--json").stdout)["positions"]
+    assert "No positions yet" in live_processes.connect(str(file), "positions").stdout
+    assert live_processes.connect(str(file), "teach", "3").stdout.startswith("3: 20 mm, 4000 counts")
+    assert live_processes.connect(str(file), "edit", "load", "0.2 in").returncode == 0
+    table = json.loads(live_processes.connect(str(file), "positions", "--json").stdout)["positions"]
     assert [(row["name"], row["number"], row["counts"]) for row in table] == [("3", 3, 4000), ("load", None, 1016)]
-    assert live_processes.run("connect", str(file), "export", str(folder / "places.csv")).returncode == 0
-    missing = live_processes.run("connect", str(file), "go_to", "lode")
+    assert live_processes.connect(str(file), "export", str(folder / "places.csv")).returncode == 0
+    missing = live_processes.connect(str(file), "go_to", "lode")
     assert (missing.returncode, missing.stdout) == (2, "")
     assert "load" in missing.stderr
     live.end()
@@ -3106,21 +3106,21 @@ def test_56_a_job_is_led_held_and_stopped_from_terminals(folder: Path, running: 
     with detent.connect(file) as axis:
         axis.enable()
         axis.confirm()
-    assert live_processes.run("connect", file, "pause").returncode == 1
-    done = live_processes.run("connect", file, "job", str(folder / "moves.csv"), "--json")
+    assert live_processes.connect(file, "pause").returncode == 1
+    done = live_processes.connect(file, "job", str(folder / "moves.csv"), "--json")
     assert (done.returncode, json.loads(done.stdout)["ended"]["how"]) == (0, "done")
     with detent.connect(file) as axis:
         assert axis.position == pytest.approx(0.01, abs=1e-4)
         job = axis.run_job(["12 mm", "40 mm"] * 50, wait=False)
-        assert live_processes.run("connect", file, "pause").returncode == 0
+        assert live_processes.connect(file, "pause").returncode == 0
         assert axis.status["job"]["paused"] is True
-        assert live_processes.run("connect", file, "resume").returncode == 0
+        assert live_processes.connect(file, "resume").returncode == 0
         assert axis.status["job"]["paused"] is False
-        assert live_processes.run("connect", file, "stop").returncode == 0
+        assert live_processes.connect(file, "stop").returncode == 0
         with pytest.raises(CommandAbortedError):
             job.wait(5.0)
-    assert live_processes.run("connect", file, "job", str(folder / "none.csv")).returncode == 2
-    assert live_processes.run("connect", file, "job").returncode == 2
+    assert live_processes.connect(file, "job", str(folder / "none.csv")).returncode == 2
+    assert live_processes.connect(file, "job").returncode == 2
     running.end()
 
 

@@ -6,7 +6,7 @@ import random
 import re
 import subprocess
 import sys
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -51,6 +51,7 @@ from detent.tune.batch import Limit, Question, chunks_of, draw, run_chunk, run_c
 from detent.tune.choice import Chooser
 from detent.tune.plants import Plants
 from detent.tune.standstill import look, standstill
+from detent.tune.tuned import Tuned
 from detent.tune.worst import worst, write_worst
 
 CASCADE = EXAMPLES / "cascade.toml"
@@ -303,8 +304,14 @@ def test_13_nothing_is_written_unasked_and_what_is_written_is_the_file_with_new_
         told.save(tmp_path / "other.toml")
 
 
+@cache
+def tuned_by_hand() -> Tuned:
+    """The example with gains found by hand, tuned: several tests look at it."""
+    return detent.load(CASCADE, BY_HAND).tune()
+
+
 def test_14_the_same_file_gives_the_same_gains_and_a_key_may_be_held():
-    one, other = (detent.load(CASCADE, BY_HAND).tune() for _ in range(2))
+    one, other = tuned_by_hand(), detent.load(CASCADE, BY_HAND).tune()
     assert json.dumps(one.to_dict()) == json.dumps(other.to_dict())
     for key, overrides in (("method.velocity_gain", ["method.velocity_gain=50 V*s/m"]), ("method.position_gain", [])):
         made = detent.load(CASCADE, (*BY_HAND, *overrides))
@@ -338,7 +345,7 @@ def test_a_choice_does_not_depend_on_the_last_bits(monkeypatch):
 @pytest.mark.compiled
 def test_12_a_move_and_a_push_before_and_after():
     """Time back within 5 um is seen by an encoder of 1 um: 131 ms here for the 139 ms of a program without counts."""
-    found = detent.load(CASCADE, BY_HAND).tune().values
+    found = tuned_by_hand().values
     rows = [moved_and_pushed({}), moved_and_pushed(found)]
     following, after_end, deflection, back = zip(*rows, strict=True)
     assert (following[0], after_end[0]) == (pytest.approx(38.9e-6, abs=1e-6), pytest.approx(28e-6, abs=1e-6))
@@ -434,11 +441,10 @@ def test_feedforward_takes_what_is_known_of_its_constants():
 
 def test_28_check_cautions_the_gains_by_hand_and_not_those_of_tune():
     """Ms of the example as it was shipped is 2.22 at 344 Hz."""
-    by_hand_too = detent.load(CASCADE, BY_HAND)
-    (caution,) = by_hand_too.check().warnings
+    (caution,) = detent.load(CASCADE, BY_HAND).check().warnings
     assert (caution.name, caution.value) == ("Ms at the command", "2.22 at 344 Hz")
     assert detent.load(CASCADE).check().warnings == ()
-    found = by_hand_too.tune().values
+    found = tuned_by_hand().values
     stated = CascadeTuning(detent.load(CASCADE).spec).stated
     assert found == stated  # the packaged example has the gains of tune, all three digits
 
@@ -865,10 +871,12 @@ def test_34_a_case_is_the_same_in_any_chunk(tmp_path):
 
 @pytest.mark.wide
 @pytest.mark.compiled
-@pytest.mark.parametrize(("count", "size"), [(5000, 100), (5000, 1000), (100_000, 1000), (100_000, 7777)])
-def test_34_a_case_is_the_same_in_a_long_run(count, size, tmp_path):
+@pytest.mark.parametrize("size", [100, 1000, 7777])
+def test_34_a_case_is_the_same_in_a_long_run(size, tmp_path):
+    """Of a run of 5,000 cases its chunk is the same."""
     question = asked(tmp_path)
-    own = next(piece for piece in chunks_of(question, count, size) if sum(piece) > 4711)
+    own = next(piece for piece in chunks_of(question, 100_000, size) if sum(piece) > 4711)
+    assert own in chunks_of(question, 5000, size) or size > 1000
     assert case_of(run_chunk(question, *own), 4711) == case_of(run_chunk(question, 4711, 1), 4711)
 
 

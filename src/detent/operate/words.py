@@ -125,7 +125,9 @@ def value_of(word: Word, value: object, unit: str) -> float:
             return parse_quantity(value, wanted) if wanted else float(value)
         except (DetentError, ValueError) as error:
             raise DetentError(f"{value!r} is not {example_of(wanted)}") from error
-    return float(value) if abs(value) < 1e300 else math.copysign(math.inf, value)
+    if abs(value) < 1e300:
+        return float(value)
+    return -math.inf if value < 0 else math.inf  # a whole number may be too long for a float
 
 
 def example_of(unit: str) -> str:

@@ -62,6 +62,12 @@ def test_whatever_is_said_is_answered(channel: Channel, client: Client, do: Any,
     channel.session.host.run(1)
 
 
+@pytest.mark.parametrize("value", [10**400, -(10**400), 1e308, math.nan])
+def test_a_place_that_no_float_holds_is_refused(channel: Channel, client: Client, value: float) -> None:
+    asked = channel._answer(json.dumps({"do": "move_to", "value": value}).encode(), client)
+    assert channel.session.host.until_ended(asked["id"]).how == ops.REFUSED
+
+
 @pytest.mark.parametrize("line", [b"", b"{", b"\xff\xfe", b"[" * 9000, b"[]", b'"stop"', b"7"])
 def test_what_is_no_message_is_an_error(channel: Channel, client: Client, line: bytes) -> None:
     assert list(channel._answer(line, client)) == ["error"]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numba
 import pytest
-from tests.live_processes import Running, live_folder, run
+from tests.live_processes import Running, connect, live_folder, run
 
 import detent
 from detent.errors import AxisError, DetentError
@@ -98,18 +98,18 @@ def test_a_fault_is_injected_told_and_ended(folder: Path) -> None:
 
 def test_faults_are_injected_and_read_from_a_second_terminal(folder: Path, running: Running) -> None:
     file = str(folder / "slide.toml")
-    assert run("connect", file, "inject", "encoder stuck").returncode == 0
-    wrong = run("connect", file, "inject", "nobody")
+    assert connect(file, "inject", "encoder stuck").returncode == 0
+    wrong = connect(file, "inject", "nobody")
     assert (wrong.returncode, "encoder off, stuck" in wrong.stderr) == (2, True)
     with detent.connect(file) as axis:
         axis.enable()
         axis.confirm()
         with pytest.raises(CommandFailedError):
             axis.move_by("5 mm")
-    told = run("connect", file, "faults")
+    told = connect(file, "faults")
     assert told.returncode == 0
     assert "F02" in told.stdout
-    (fault,) = json.loads(run("connect", file, "faults", "--json").stdout)["faults"]
+    (fault,) = json.loads(connect(file, "faults", "--json").stdout)["faults"]
     assert fault["code"] == "F02"
     running.ended()
 

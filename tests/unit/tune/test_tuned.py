@@ -19,6 +19,7 @@ from detent.tune.choice import Chooser, Guaranteed
 from detent.tune.plants import Plants
 from detent.tune.tuned import _refusals
 
+pytestmark = pytest.mark.early
 CASCADE = EXAMPLES / "cascade.toml"
 TOLERANCE = '\n[tolerance]\n"mechanics.load_mass" = "10 %"\n'
 
