@@ -16,6 +16,7 @@ from detent.logs.differences import (
     paired_changes,
     parabolas,
     products_of,
+    quick_length,
     resolution,
     runs_of,
     spread,
@@ -105,6 +106,12 @@ def test_parabolas_are_exact_for_parabolas():
 def test_products_at_all_shifts_are_those_of_a_correlation(n: int, m: int) -> None:
     a, b = RNG.normal(size=n), RNG.normal(size=m)
     assert products_of(a, b) == pytest.approx(signal.correlate(a, b, mode="full", method="direct"), abs=1e-10)
+
+
+def test_quick_lengths_are_the_least_products_of_2_3_and_5():
+    products = {2**a * 3**b * 5**c for a in range(12) for b in range(8) for c in range(6)}
+    for count in range(1, 2000):
+        assert quick_length(count) == min(n for n in products if n >= count)
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 8, 30])

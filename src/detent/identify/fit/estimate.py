@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from detent.identify.fit.chance import student_reach
 from detent.logs.differences import scipy
 from detent.logs.log import Values
 
@@ -109,9 +110,7 @@ def quantile(degrees: float) -> float:
     >>> round(quantile(float("inf")), 3), round(quantile(10), 3)
     (1.96, 2.228)
     """
-    # SciPy's stats package calls the same functions, and takes longer to load than most logs to identify.
-    special, upper = scipy("special"), 0.5 * (1.0 + LEVEL)
-    return float(special.ndtri(upper) if np.isinf(degrees) else special.stdtrit(max(degrees, 1.0), upper))
+    return student_reach(0.5 * (1.0 - LEVEL), max(degrees, 1.0))
 
 
 def independent_rows(residual: Values) -> float:
@@ -150,8 +149,17 @@ def count_cosines(rows: int, independent: float) -> int:
 
 def long_run_variance(scores: Values, cosines: int) -> Values:
     """Long-run covariance of rows in their order of time."""
-    projected: Values = scipy("fft").dct(scores, axis=0, norm="ortho")[1 : cosines + 1]
+    projected = _cosine_sums(scores, cosines)
     return projected.T @ projected / len(projected)
+
+
+def _cosine_sums(rows: Values, cosines: int) -> Values:
+    """The cosine transform of rows, the first without the mean, by Fourier's (Makhoul, IEEE Trans. ASSP 28 (1980))."""
+    # SciPy has it; its package takes longer to load than most logs to identify.
+    n = len(rows)
+    spectrum = np.fft.fft(np.concatenate([rows[::2], rows[1::2][::-1]]), axis=0)[1 : cosines + 1]
+    turned = spectrum * np.exp(-0.5j * np.pi / n * np.arange(1, len(spectrum) + 1))[:, None]
+    return np.sqrt(2.0 / n) * turned.real
 
 
 def coloured_covariance(columns: Values, residual: Values, instruments: Values | None = None) -> tuple[Values, int]:

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from detent.identify.fit import equations, regression
+from detent.identify.fit.chance import student_reach
 from detent.identify.fit.estimate import carried_degrees, coloured_covariance, quantile, rms
-from detent.logs.differences import scipy
 from detent.logs.log import Values
 
 CHANCE = 2e-5  # probability of a change as clear by chance, in each direction, of one constant with one course
@@ -57,7 +57,7 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
             degrees = float(carried_degrees(columns, residual, tools, cosines)[-1])
             amplitude, error = float(values[-1]), float(np.sqrt(max(covariance[-1, -1], 0.0)))
             own = quantile(float(fit.degrees[k])) * float(np.sqrt(max(fit.covariance[k, k], 0.0)))
-            least = -float(scipy("special").stdtrit(max(degrees, 1.0), CHANCE))
+            least = student_reach(CHANCE, max(degrees, 1.0))
             clear = abs(amplitude) / max(error * least, 1e-300)
             size = abs(amplitude) * rms(x[:, k]) / max(rms(effort), 1e-300)
             share = abs(amplitude / float(values[k])) if name == "mass" and values[k] else size

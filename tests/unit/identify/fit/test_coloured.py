@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import fft
 from scipy.signal import lfilter
 from tests.identify_rig import binomial_bounds
 
@@ -164,3 +165,12 @@ def test_intervals_hold_for_a_constant_that_few_rows_carry():
     low, _ = binomial_bounds(1000, doubt=1e-3)
     assert np.mean(held, axis=0).min() > low
     assert np.mean(short, axis=0)[1] < low
+
+
+@pytest.mark.parametrize("rows", [4, 5, 24, 25, 2452])
+def test_its_cosines_are_scipys(rows):
+    scores = np.random.default_rng(rows).normal(size=(rows, 3))
+    cosines = min(40, rows)
+    projected = fft.dct(scores, axis=0, norm="ortho")[1 : cosines + 1]
+    expected = projected.T @ projected / len(projected)
+    assert long_run_variance(scores, cosines) == pytest.approx(expected, rel=1e-11, abs=1e-13)
