@@ -304,11 +304,16 @@ Term = Callable[[Motion, float], Values]
 
 def _bristle(m: Motion, stribeck: float, sense: int) -> Values:
     """Part of the low-speed friction that is left at each sample, in one direction."""
-    speed = m.quick * sense
-    left = np.where(speed > 0.0, np.exp(-LOST), 0.0)
+    # Most windows see nothing slow: what is left in them is `LOST`, as long as they go this way.
+    way, half = (m.right if sense > 0 else m.left), m.kernel.half
+    found = math.exp(-LOST) * way
+    speed = m.quick if sense > 0 else -m.quick
     slow = np.flatnonzero((speed > 0.0) & (speed < 1.01 * math.sqrt(LOST) * stribeck))
+    seen = np.searchsorted(slow, m.rows + half, side="right") > np.searchsorted(slow, m.rows - half)
+    left = np.where(speed > 0.0, math.exp(-LOST), 0.0)
     left[slow] = np.exp(-np.minimum((speed[slow] / stribeck) ** 2, LOST))
-    return sense * m.kernel.mean(left, m.rows)
+    found[seen] = m.kernel.mean(left, m.rows[seen])
+    return sense * found
 
 
 TERMS: Mapping[str, Term] = {

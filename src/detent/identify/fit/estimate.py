@@ -204,13 +204,14 @@ def column_sizes(columns: Values) -> Values:
 def _lagged_variance(scores: Values, memory: float) -> Values:
     """Long-run covariance by weighted lags, as far as residuals remember (Newey, West 1987; Stock, Watson, 15.4)."""
     # It and the projections err independently; the larger of both does not leave an interval too short by chance.
+    # Weights that fall to 0 in a straight line are those of the products of moving sums: one pass for all lags.
     n = len(scores)
     lags = min(round(max(4.0, 0.75 * n ** (1.0 / 3.0), 3.0 * memory)), n - 1)
-    total = scores.T @ scores
-    for lag in range(1, lags + 1):
-        product = scores[lag:].T @ scores[:-lag]
-        total = total + (1.0 - lag / (lags + 1.0)) * (product + product.T)
-    return total / n
+    added = np.zeros((n + 2 * lags + 1, scores.shape[1]))
+    np.cumsum(scores, axis=0, out=added[lags + 1 : lags + 1 + n])
+    added[lags + 1 + n :] = added[lags + n]
+    moving = added[lags + 1 :] - added[: -lags - 1]
+    return moving.T @ moving / (n * (lags + 1.0))
 
 
 def known_noise_covariance(

@@ -70,8 +70,9 @@ class Plant:
         cascade.switch_on(self._params, r, position - self._hanging)
         r.plant.machine.motor.velocity = r.plant.machine.load.velocity = velocity
         ticks = (samples - 1) * self.ticks
-        at = np.arange(ticks) + begin * self.ticks - self._late
-        command = effort[np.clip(at // self.ticks, 0, len(effort) - 1)]
+        first, into = divmod(begin * self.ticks - self._late, self.ticks)
+        held = effort[np.clip(np.arange(first, first + samples), 0, len(effort) - 1)]
+        command = np.repeat(held, self.ticks)[into : into + ticks]
         rows = np.zeros((samples, 8), np.uint8)
         advance(self._params, r, ticks, rows, _PICKS, self.ticks, *cascade.driven(command))
         moved = rows.view(np.float64)[:, 0] + self._hanging
