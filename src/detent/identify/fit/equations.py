@@ -21,7 +21,7 @@ Messenger, Bortz: Weak SINDy: Galerkin-based data-driven model selection. Multis
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -237,12 +237,22 @@ def _held(half: int, late: float) -> tuple[Values, Values]:
 def _sums(signal: Values, weights: Values, rows: Rows) -> Values:
     """Weighted sum around each of some samples; the signal keeps its end values beyond its ends."""
     half = len(weights) // 2
+    if _are_inside(rows, half, len(signal)):
+        return _weighted(signal, weights, rows - half)
     return _weighted(np.concatenate([np.full(half, signal[0]), signal, np.full(half, signal[-1])]), weights, rows)
 
 
 def _way_sums(position: Values, weights: Values, rows: Rows) -> Values:
     """The same for weights that add up to 0, by the ways between samples."""
-    return _weighted(np.pad(np.diff(position), len(weights) // 2), _way_weights(weights), rows)
+    half, ways = len(weights) // 2, np.diff(position)
+    if _are_inside(rows, half, len(position)):
+        return _weighted(ways, _way_weights(weights), rows - half)
+    return _weighted(np.pad(ways, half), _way_weights(weights), rows)
+
+
+def _are_inside(rows: Rows, half: int, count: int) -> bool:
+    """True where a signal of so many samples need not be continued beyond its ends: that would be a copy of it."""
+    return len(rows) > 0 and half <= int(rows.min()) and int(rows.max()) < count - half
 
 
 def _way_weights(weights: Values) -> Values:
@@ -266,7 +276,7 @@ def _weighted(padded: Values, weights: Values, rows: Rows) -> Values:
 # ---- the equation of motion
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """What a position says, window by window, each of shape (m,) unless said otherwise."""
 
@@ -281,6 +291,30 @@ class Motion:
     effort: Values
     rows: Rows  # samples around which the windows lie
     kernel: Kernel  # their window
+
+    # Every model that is tried asks for these, and they are the same for all.
+
+    @cached_property
+    def jerk(self) -> Values:
+        """Third derivative of the position [m/s^3] or in rad."""
+        return self.kernel.jerk(self.places, self.rows)
+
+    @cached_property
+    def sine(self) -> Values:
+        """Mean of the sine of the position."""
+        return self.kernel.mean(np.sin(self.places), self.rows)
+
+    @cached_property
+    def cosine(self) -> Values:
+        """Mean of its cosine."""
+        return self.kernel.mean(np.cos(self.places), self.rows)
+
+    @cached_property
+    def driving(self) -> tuple[Values, Values]:
+        """Shares of each window in which the effort acts along the motion, and against it."""
+        with_motion = np.sign(self.effort) * np.sign(self.quick)
+        along, against = (self.kernel.mean((with_motion == sign).astype(float), self.rows) for sign in (1.0, -1.0))
+        return along, against
 
 
 def fine_kernel(kernel: Kernel) -> Kernel:
@@ -327,8 +361,8 @@ TERMS: Mapping[str, Term] = {
     "viscous.negative": lambda m, _: np.minimum(m.velocity, 0.0),
     "excess.positive": lambda m, s: _bristle(m, s, 1),
     "excess.negative": lambda m, s: _bristle(m, s, -1),
-    "pendulum": lambda m, _: m.kernel.mean(np.sin(m.places), m.rows),
-    "pendulum.across": lambda m, _: m.kernel.mean(np.cos(m.places), m.rows),
+    "pendulum": lambda m, _: m.sine,
+    "pendulum.across": lambda m, _: m.cosine,
     "spring": lambda m, _: m.position,
 }
 """Every term of an equation of motion; `excess` is static less Coulomb friction."""
@@ -349,8 +383,8 @@ def model_columns(m: Motion, names: Sequence[str], bend: float) -> Values:
     columns = np.column_stack([TERMS[name](m, bend) for name in terms_of(names)])
     if LOSS not in names:
         return columns
-    with_motion = np.sign(m.effort) * np.sign(m.quick)
-    return columns * m.kernel.mean(1.0 / (1.0 - bend * with_motion), m.rows)[:, None]
+    along, against = m.driving
+    return columns * (1.0 + along * (bend / (1.0 - bend)) - against * (bend / (1.0 + bend)))[:, None]
 
 
 def standstill_velocity(run: Run, kernel: Kernel) -> float:
