@@ -15,6 +15,7 @@ from detent.logs.differences import (
     median_of_nine,
     paired_changes,
     parabolas,
+    products_near,
     products_of,
     quick_length,
     resolution,
@@ -147,3 +148,11 @@ def test_medians_and_spreads_over_windows_are_those_of_image_filters(count):
     for rows in (1, 2, 3, 7, 8):
         expected = ndimage.maximum_filter1d(values, rows) - ndimage.minimum_filter1d(values, rows)
         assert np.array_equal(spread(values, rows), expected)
+
+
+@pytest.mark.parametrize(("rows", "more"), [(50, 7), (31_000, 400), (95_000, 400)])
+def test_products_near_are_those_of_the_whole_transform(rows, more):
+    rng = np.random.default_rng(rows)
+    a, b = rng.normal(size=rows + more), rng.normal(size=rows)
+    whole = products_of(a, b)[rows - 1 : rows + more]
+    assert products_near(a, b) == pytest.approx(whole, rel=1e-9, abs=1e-9 * np.sqrt(rows))

@@ -107,7 +107,7 @@ def make_run(log: Log, effort: str | None = None) -> Run:
     # What drives stands from each of its samples to the next.
     is_even = len(grid) == len(log.t) and float(np.abs(grid - log.t).max()) < 0.2 * step
     places = np.clip(np.searchsorted(log.t, grid + 0.2 * step, side="right") - 1, 0, len(log.t) - 1)
-    held = (values if is_even else values[places]).astype(np.float64)
+    held = (values if is_even else values[places]).astype(np.float64, copy=False)
     units, noise = (log.units[name] or "1", log.units["position"]), max(noise_of(position), 0.29 * resolution)
     usable = _usable(log, grid, name)
     return Run(log.name, step, position, held, usable, name, *units, reference, resolution, noise)
@@ -322,9 +322,9 @@ def fine_kernel(kernel: Kernel) -> Kernel:
     return make_kernel(min(kernel.half, max(FINEST, round(FINE / kernel.step))), kernel.step)
 
 
-def make_motion(position: Values, effort: Values, kernel: Kernel, rows: Rows) -> Motion:
-    """Position, velocity and acceleration by a window."""
-    quick = fine_kernel(kernel).velocities(position)
+def make_motion(position: Values, effort: Values, kernel: Kernel, rows: Rows, quick: Values | None = None) -> Motion:
+    """Position, velocity and acceleration by a window; `quick` is the velocity by `fine_kernel`, where it is known."""
+    quick = fine_kernel(kernel).velocities(position) if quick is None else quick
     still = 0.5 * (quick == 0.0)
     right, left = (kernel.mean(way + still, rows) for way in (quick > 0.0, quick < 0.0))
     place, acceleration = kernel.mean(position, rows), kernel.acceleration(position, rows)
@@ -394,11 +394,11 @@ def standstill_velocity(run: Run, kernel: Kernel) -> float:
     return max(NOISES * noise, 0.5 * count)
 
 
-def usable_rows(run: Run, kernel: Kernel) -> Rows:
-    """Samples, evenly spaced, around which the equation of motion holds for a whole window."""
+def usable_rows(run: Run, kernel: Kernel, quick: Values | None = None) -> Rows:
+    """Samples, evenly spaced, around which the equation of motion holds for a whole window; `quick` as of a motion."""
     half, n = kernel.half, len(run.position)
     fine = fine_kernel(kernel)
-    quick = fine.velocities(run.position)
+    quick = fine.velocities(run.position) if quick is None else quick
     bad = ~run.usable | (np.abs(quick) <= standstill_velocity(run, fine))
     bad[:-1] |= quick[1:] * quick[:-1] < 0.0
     before = np.concatenate([[0], np.cumsum(bad)])

@@ -306,16 +306,16 @@ def _follows(part: Prepared) -> bool:
 
 def prepare_all(runs: Sequence[Run], instruments: Instruments) -> list[Prepared]:
     """Windows wide enough that noise does not matter, the same for all runs."""
-    half = WINDOW
+    half, before = WINDOW, list[Prepared | None]([None] * len(runs))
     while True:
         kernels = [make_kernel(max(5, round(half / run.step)), run.step) for run in runs]
-        parts = [prepare(run, kernel, instruments) for run, kernel in zip(runs, kernels, strict=True)]
+        parts = [prepare(*one, instruments, like) for *one, like in zip(runs, kernels, before, strict=True)]
         seconds = [float(kernel.second @ kernel.second) for kernel in kernels]
         noise = sum(len(p.motion.rows) * p.run.noise**2 * s for p, s in zip(parts, seconds, strict=True))
         power = sum(float(np.sum(p.motion.acceleration**2)) for p in parts)
         if half >= WIDEST or (noise / power if power > 0.0 else 0.0) < NOISE_SHARE[instruments]:
             return parts
-        half *= 1.4
+        half, before = 1.4 * half, list(parts)
 
 
 def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run]) -> tuple[Rung, ...]:
@@ -379,6 +379,7 @@ def _test_simulation(
     if sum(len(p.motion.rows) for p in parts) < 3 * len(fit.names):
         return None, (), None
     constants = constants_of(fit_rung(parts, rung))
+    del parts  # a simulation takes as much memory
     if constants.value("mass") <= 0.0:
         return None, (), None
     if method == "output error":

@@ -19,7 +19,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from detent.identify.fit import equations
-from detent.identify.fit.equations import Run
+from detent.identify.fit.equations import Run, make_motion
 from detent.identify.fit.estimate import RANK, carried_degrees, coloured_covariance, column_sizes, independent_rows, rms
 from detent.logs.differences import MOST_ROWS
 from detent.logs.log import Values
@@ -120,19 +120,26 @@ def residuals_of(fit: Fit) -> Residuals:
     return Residuals(size, relative, float(np.abs(e).max()), neighbours, independent_rows(e), len(e))
 
 
-def prepare(run: Run, kernel: equations.Kernel, instruments: Instruments) -> Prepared:
-    """Make the windows of a run."""
-    rows, n = equations.usable_rows(run, kernel), len(run.position)
+def prepare(run: Run, kernel: equations.Kernel, instruments: Instruments, like: Prepared | None = None) -> Prepared:
+    """Make the windows of a run; `like` is the same by other windows, of which what no window changes is taken."""
+    fine, n = equations.fine_kernel(kernel), len(run.position)
+    if like is None or like.instruments != instruments or equations.fine_kernel(like.motion.kernel).half != fine.half:
+        like = None
+    quick = like.motion.quick if like else fine.velocities(run.position)
+    rows = equations.usable_rows(run, kernel, quick)
     if instruments == "position":
         wide = equations.make_kernel(max(min(round(WIDER * kernel.half), round(ENDS * n)), kernel.half), run.step)
         rows = rows[(rows > wide.half) & (rows < n - wide.half)]
-        ideal = equations.make_motion(run.position, run.effort, wide, rows)
-        return Prepared(run, equations.make_motion(run.position, run.effort, kernel, rows), ideal, instruments)
-    motion = ideal = equations.make_motion(run.position, run.effort, kernel, rows)
-    if instruments == "reference" and run.reference is not None:
+        known = quick if equations.fine_kernel(wide).half == fine.half else None
+        ideal = make_motion(run.position, run.effort, wide, rows, known)
+        return Prepared(run, make_motion(run.position, run.effort, kernel, rows, quick), ideal, instruments)
+    motion = ideal = make_motion(run.position, run.effort, kernel, rows, quick)
+    if like and like.ideal is not like.motion:
+        ideal = make_motion(like.ideal.places, run.effort, kernel, rows, like.ideal.quick)
+    elif like is None and instruments == "reference" and run.reference is not None:
         lag = lag_of(run.reference, run)
         delayed = np.concatenate([np.full(lag, run.reference[0]), run.reference[: n - lag]])
-        ideal = equations.make_motion(delayed, run.effort, kernel, rows)
+        ideal = make_motion(delayed, run.effort, kernel, rows)
     return Prepared(run, motion, ideal, instruments)
 
 
