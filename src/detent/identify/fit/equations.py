@@ -310,6 +310,16 @@ class Motion:
         return self.kernel.mean(np.cos(self.places), self.rows)
 
     @cached_property
+    def slowest(self) -> tuple[Values, Values]:
+        """Lowest speed within each window to larger positions, and to smaller ones; infinite where there is none."""
+        half, found = self.kernel.half, list[Values]()
+        for speed in (self.quick, -self.quick):
+            moving = np.lib.stride_tricks.sliding_window_view(np.where(speed > 0.0, speed, np.inf), 2 * half + 1)
+            blocks = np.array_split(self.rows - half, 1 + len(self.rows) * (2 * half + 1) // BLOCK)
+            found.append(np.concatenate([moving[block].min(axis=1) for block in blocks]))
+        return found[0], found[1]
+
+    @cached_property
     def driving(self) -> tuple[Values, Values]:
         """Shares of each window in which the effort acts along the motion, and against it."""
         with_motion = np.sign(self.effort) * np.sign(self.quick)
@@ -339,11 +349,11 @@ Term = Callable[[Motion, float], Values]
 def _bristle(m: Motion, stribeck: float, sense: int) -> Values:
     """Part of the low-speed friction that is left at each sample, in one direction."""
     # Most windows see nothing slow: what is left in them is `LOST`, as long as they go this way.
-    way, half = (m.right if sense > 0 else m.left), m.kernel.half
-    found = math.exp(-LOST) * way
+    way, least = (m.right, m.slowest[0]) if sense > 0 else (m.left, m.slowest[1])
+    found, quickest = math.exp(-LOST) * way, 1.01 * math.sqrt(LOST) * stribeck
+    seen = least < quickest
     speed = m.quick if sense > 0 else -m.quick
-    slow = np.flatnonzero((speed > 0.0) & (speed < 1.01 * math.sqrt(LOST) * stribeck))
-    seen = np.searchsorted(slow, m.rows + half, side="right") > np.searchsorted(slow, m.rows - half)
+    slow = np.flatnonzero((speed > 0.0) & (speed < quickest))
     left = np.where(speed > 0.0, math.exp(-LOST), 0.0)
     left[slow] = np.exp(-np.minimum((speed[slow] / stribeck) ** 2, LOST))
     found[seen] = m.kernel.mean(left, m.rows[seen])

@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 from tests.identify_rig import binomial_bounds
 
 from detent.identify.fit.estimate import (
+    _lagged_variance,
     carried_degrees,
     coloured_covariance,
     count_cosines,
@@ -174,3 +175,14 @@ def test_its_cosines_are_scipys(rows):
     projected = fft.dct(scores, axis=0, norm="ortho")[1 : cosines + 1]
     expected = projected.T @ projected / len(projected)
     assert long_run_variance(scores, cosines) == pytest.approx(expected, rel=1e-11, abs=1e-13)
+
+
+@pytest.mark.parametrize(("rows", "memory"), [(12, 1.0), (300, 20.0), (2452, 2.0)])
+def test_its_lags_are_those_added_up_one_by_one(rows, memory):
+    scores = autoregressive(np.random.default_rng(rows), (2, rows), 0.8).T
+    lags = min(round(max(4.0, 0.75 * rows ** (1.0 / 3.0), 3.0 * memory)), rows - 1)
+    expected = scores.T @ scores
+    for lag in range(1, lags + 1):
+        product = scores[lag:].T @ scores[:-lag]
+        expected += (1.0 - lag / (lags + 1.0)) * (product + product.T)
+    assert _lagged_variance(scores, memory) == pytest.approx(expected / rows, rel=1e-10, abs=1e-12)
