@@ -7,7 +7,7 @@ same functions run as plain Python on the same memory and give the same bits.
 import gc
 import hashlib
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -122,7 +122,7 @@ def _compiled(function: F, *, forceinline: bool) -> F:
 
 
 @contextmanager
-def _uncollected() -> Iterator[None]:
+def _uncollected() -> Generator[None]:
     """Let the collector of garbage rest: a compiler makes millions of objects that it would look through in vain."""
     was_on = gc.isenabled()
     gc.disable()

@@ -306,16 +306,17 @@ def _follows(part: Prepared) -> bool:
 
 def prepare_all(runs: Sequence[Run], instruments: Instruments) -> list[Prepared]:
     """Windows wide enough that noise does not matter, the same for all runs."""
-    half, before = WINDOW, list[Prepared | None]([None] * len(runs))
+    half = WINDOW
+    before: Sequence[Prepared | None] = [None for _ in runs]
     while True:
         kernels = [make_kernel(max(5, round(half / run.step)), run.step) for run in runs]
-        parts = [prepare(*one, instruments, like) for *one, like in zip(runs, kernels, before, strict=True)]
+        parts = [prepare(r, k, instruments, like) for r, k, like in zip(runs, kernels, before, strict=True)]
         seconds = [float(kernel.second @ kernel.second) for kernel in kernels]
         noise = sum(len(p.motion.rows) * p.run.noise**2 * s for p, s in zip(parts, seconds, strict=True))
         power = sum(float(np.sum(p.motion.acceleration**2)) for p in parts)
         if half >= WIDEST or (noise / power if power > 0.0 else 0.0) < NOISE_SHARE[instruments]:
             return parts
-        half, before = 1.4 * half, list(parts)
+        half, before = 1.4 * half, parts
 
 
 def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run]) -> tuple[Rung, ...]:
