@@ -117,12 +117,11 @@ def folder_for(option: str, folder: Path, others: Collection[str] = (), *, force
 @contextmanager
 def progress_bar(*, quiet: bool) -> Generator[Callable[[float, str], None]]:
     """A bar on the terminal's error channel; silent for --json and where nobody looks."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = make_console(stderr=True)
-    if quiet or _QUIET[0] or not console.is_terminal:
+    if quiet or _QUIET[0] or not (console := make_console(stderr=True)).is_terminal:
         yield lambda _share, _text: None
         return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting", total=1.0)
@@ -141,14 +140,13 @@ def say_compiling(why_unkept: str) -> None:
 @contextmanager
 def compiling_counted(*, quiet: bool) -> Generator[None]:
     """Seconds that pass, on a terminal, once the compiler has begun."""
+    if quiet or _QUIET[0] or not (console := make_console(stderr=True)).is_terminal:
+        yield
+        return
     from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
     from detent.kernel.cache import AT_FIRST_COMPILING
 
-    console = make_console(stderr=True)
-    if quiet or _QUIET[0] or not console.is_terminal:
-        yield
-        return
     with Progress(TextColumn("compiling the loop"), TimeElapsedColumn(), console=console, transient=True) as bar:
 
         def begin(_why: str) -> None:

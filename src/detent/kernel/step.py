@@ -4,9 +4,11 @@ A step reads its Params, writes its own Registers, allocates nothing and never r
 same functions run as plain Python on the same memory and give the same bits.
 """
 
+import gc
 import hashlib
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -119,6 +121,18 @@ def _compiled(function: F, *, forceinline: bool) -> F:
     return cast("F", made)
 
 
+@contextmanager
+def _uncollected() -> Generator[None]:
+    """Let the collector of garbage rest: a compiler makes millions of objects that it would look through in vain."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
 def _compile_parts(made: Any) -> None:
     """Make a call by another step compile a part, and a call by Python what can be called, with the parts in it.
 
@@ -139,7 +153,7 @@ def _compile_parts(made: Any) -> None:
 
     def compile_for(signature: Any) -> Any:
         """For whoever calls."""
-        with global_compiler_lock:
+        with global_compiler_lock, _uncollected():
             kinds, _ = sigutils.normalize_signature(signature)
             for_steps = "no_cpython_wrapper" in made.targetoptions
             known = made.overloads.get(tuple(kinds))

@@ -14,6 +14,7 @@ QUANTA = 20.0  # times its grain by which a position should change over a window
 FARTHEST = 200  # rows up to which a shift is looked for
 MOST_ROWS = 200_000  # rows that tell what all of a longer recording does: every so manieth is looked at
 STEP = 0.25  # part of its span by which a signal changes from one sample to the next where it is stepped
+STRETCH = 30_000  # rows of a stretch whose products are added up by one transform, at least
 FEWEST_WINDOWS = 20  # windows that a recording is divided into at least
 
 
@@ -120,7 +121,7 @@ def correlate(ours: Values, theirs: Values) -> Values:
     ours, theirs = ours - ours.mean(), theirs - theirs.mean()
     # Only what lies in the middle takes part, so that each shift compares as many samples.
     middle = theirs[most : len(theirs) - most]
-    products = products_of(ours, middle)[len(middle) - 1 : len(ours)]
+    products = products_near(ours, middle)
     squares = np.cumsum(np.r_[0.0, ours**2])
     sizes = np.sqrt(np.maximum(squares[len(middle) :] - squares[: len(squares) - len(middle)], 1e-300))
     return products / (sizes * (float(np.sqrt(middle @ middle)) or 1.0))
@@ -129,9 +130,40 @@ def correlate(ours: Values, theirs: Values) -> Values:
 def products_of(ours: Values, theirs: Values) -> Values:
     """Sums of products of two series at all shifts at which they overlap, by a transform, shape (n + m - 1,)."""
     # SciPy's signal package does the same, and takes longer to load than most logs to identify.
-    fft, count = scipy("fft"), len(ours) + len(theirs) - 1
-    size = fft.next_fast_len(count, real=True)
-    return np.asarray(fft.irfft(fft.rfft(ours, size) * fft.rfft(theirs[::-1], size), size)[:count], np.float64)
+    count = len(ours) + len(theirs) - 1
+    size = quick_length(count)
+    spectrum = np.fft.rfft(ours, size)
+    spectrum *= np.fft.rfft(theirs[::-1], size)
+    return np.asarray(np.fft.irfft(spectrum, size)[:count], np.float64)
+
+
+def products_near(ours: Values, theirs: Values) -> Values:
+    """Sums of products of the second series with as many rows of the first, from each that it can begin at."""
+    # The transforms of stretches add up: a long recording needs no transform of its own length.
+    more = len(ours) - len(theirs)
+    size = quick_length(min(STRETCH, len(theirs)) + more)
+    spectrum = np.zeros(size // 2 + 1, np.complex128)
+    for first in range(0, len(theirs), size - more):
+        end = min(first + size - more, len(theirs))
+        spectrum += np.fft.rfft(ours[first : end + more], size) * np.fft.rfft(theirs[first:end], size).conj()
+    return np.asarray(np.fft.irfft(spectrum, size)[: more + 1], np.float64)
+
+
+def quick_length(count: int) -> int:
+    """Least length of at least so many rows whose transform is quick: a product of 2, 3 and 5.
+
+    >>> quick_length(1025), quick_length(1000)
+    (1080, 1000)
+    """
+    best = 1 << max(count - 1, 0).bit_length()
+    fives = 1
+    while fives < best:
+        odd = fives
+        while odd < best:
+            best = min(best, odd << max(-(-count // odd) - 1, 0).bit_length())
+            odd *= 3
+        fives *= 5
+    return best
 
 
 def peaks_of(curve: Values) -> NDArray[np.intp]:

@@ -209,6 +209,8 @@ class Draft:
 
     def keep(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> None:
         """Keep some samples, by a mask or in the order of indices."""
+        if which.dtype == np.bool_ and which.all():
+            return
         self.t, self.rows = self.t[which], self.rows[which]
         self.values = {role: values[which] for role, values in self.values.items()}
 

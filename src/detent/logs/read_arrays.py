@@ -5,7 +5,7 @@ import warnings
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,9 +14,11 @@ from detent.files.text import check_file
 from detent.logs import raw_table
 from detent.logs.differences import scipy
 from detent.logs.headings import split_heading
-from detent.logs.mapping import FileOptions
 from detent.record.trace import BROKEN_OFF, broke_off
 from detent.record.trace_files import trace_attributes
+
+if TYPE_CHECKING:
+    from detent.logs.mapping import FileOptions
 
 MAX_COLUMNAR = 2_000_000_000  # largest HDF5 or Parquet file read; what counts is how many numbers are taken from it
 MAX_BYTES = 500_000_000  # largest file of arrays read, HDF5 and Parquet aside
@@ -29,7 +31,7 @@ _DEEPEST_GROUP = 6
 _UNIT_NAMES = ("unit", "units", "Unit", "Units")
 
 
-def read_mat(path: Path, options: FileOptions) -> raw_table.RawTable:
+def read_mat(path: Path, options: "FileOptions") -> raw_table.RawTable:
     """Read a MATLAB file, of version 7.3 as HDF5; names in structures, or in that of ``table``, joined by points.
 
     Tables and timetables are objects, which mat-io reads, where it is installed.
@@ -57,7 +59,7 @@ def _holds_objects(path: Path) -> bool:
         return any("MATLAB_object_decode" in file[name].attrs for name in file if not name.startswith("#"))
 
 
-def _read_objects(path: Path, options: FileOptions) -> raw_table.RawTable:
+def _read_objects(path: Path, options: "FileOptions") -> raw_table.RawTable:
     """Read tables and timetables of MATLAB; the times of the rows of a timetable are its time."""
     try:
         with warnings.catch_warnings():
@@ -86,7 +88,7 @@ def _read_objects(path: Path, options: FileOptions) -> raw_table.RawTable:
     return raw_table.table_of(str(path), _inside(str(path), items, options.table), ALLOWED_MAT)
 
 
-def read_npz(path: Path, options: FileOptions) -> raw_table.RawTable:
+def read_npz(path: Path, options: "FileOptions") -> raw_table.RawTable:
     """Read arrays saved by NumPy, as NPZ or as one structured or plain NPY; pickled objects are refused."""
     check_file(path, MAX_BYTES, ALLOWED_NPZ)
     items: list[raw_table.Item] = []
@@ -111,7 +113,7 @@ def read_npz(path: Path, options: FileOptions) -> raw_table.RawTable:
     return raw_table.table_of(str(path), _inside(str(path), items, options.table), ALLOWED_NPZ)
 
 
-def read_parquet(path: Path, options: FileOptions) -> raw_table.RawTable:
+def read_parquet(path: Path, options: "FileOptions") -> raw_table.RawTable:
     """Read a Parquet file; the metadata ``unit`` of a field, as detent's traces have it, is its unit."""
     check_file(path, MAX_COLUMNAR, ALLOWED_PARQUET)
     try:
@@ -129,7 +131,7 @@ def read_parquet(path: Path, options: FileOptions) -> raw_table.RawTable:
     return table
 
 
-def _broke_off(path: Path, told: Mapping[str, Any], options: FileOptions) -> list[str]:
+def _broke_off(path: Path, told: Mapping[str, Any], options: "FileOptions") -> list[str]:
     """What to note of a trace whose run broke off, where that was asked for; refuse it where not."""
     if not broke_off(told) or not str(told.get("format", "")).startswith("detent trace"):
         return []
@@ -205,7 +207,7 @@ def _inside(file: str, items: list[raw_table.Item], table: str) -> list[raw_tabl
 # ---- HDF5: detent's own traces, MATLAB 7.3, and what other programs write
 
 
-def read_hdf5(path: Path, options: FileOptions) -> raw_table.RawTable:
+def read_hdf5(path: Path, options: "FileOptions") -> raw_table.RawTable:
     """Read the datasets of an HDF5 file; links out of the file are not followed.
 
     Of a file with several groups that hold vectors, the one with the most is read unless ``table`` names another.

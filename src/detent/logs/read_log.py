@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 
@@ -78,7 +80,10 @@ def read_table(path: str | Path, options: FileOptions | None = None, *, apart: b
         remedy = "give the file the ending of its kind, or save it as one of these"
         raise InputError.of_file(str(path), got, f"{', '.join(READERS)}; text also with .gz", remedy)
     reader, options = READERS[kind], options or FileOptions()
-    return read_apart(reader, path, ALLOWED, options) if apart and reader is not read_csv else reader(path, options)
+    if not apart or reader is read_csv:
+        return reader(path, options)
+    # What checks options takes as long to load as some libraries that read files: the other process gets them checked.
+    return read_apart(reader, path, ALLOWED, cast("FileOptions", SimpleNamespace(**options.model_dump())))
 
 
 def clean(draft: Draft) -> None:

@@ -113,7 +113,7 @@ def test_two_commands_agree_on_one_log() -> None:
     path, columns = DATA / "emps" / "DATA_EMPS.mat", ["force=vir [35.15 N]"]
     analysed = detent.analyse(path, "two-speeds", columns=columns)
     identified = detent.identify_axis(path, columns=columns)
-    steady = next(one for one in analysed["two-speeds"].estimates if one.name == "viscous.positive")
+    steady = next(one for one in analysed["two-speeds"].estimates if one.name == "slope.positive")
     whole = identified.constants["viscous.positive"]
     assert steady.value == pytest.approx(149.6, abs=0.05)
     assert whole.value == pytest.approx(166.3, abs=0.05)

@@ -1,5 +1,7 @@
 """Steps that only steps call are parts of what calls them, and can be called by Python all the same."""
 
+import gc
+
 import numba
 import pytest
 
@@ -78,3 +80,18 @@ def test_a_step_that_python_called_first_is_called_by_steps():
     pair = Pair(one=1.0, other=0.0)
     assert bottom(pair) == float("inf")
     assert above(pair) == float("inf")
+
+
+@step
+def plain(r: Pair) -> float:
+    return 2.0 * bottom(r)
+
+
+@pytest.mark.parametrize("is_on", [True, False])
+def test_the_collector_of_garbage_is_after_compiling_as_it_was_before(is_on):
+    (gc.enable if is_on else gc.disable)()
+    try:
+        plain.compile((numba.typeof(Pair()),))
+        assert gc.isenabled() is is_on
+    finally:
+        gc.enable()

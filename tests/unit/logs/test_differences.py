@@ -15,7 +15,9 @@ from detent.logs.differences import (
     median_of_nine,
     paired_changes,
     parabolas,
+    products_near,
     products_of,
+    quick_length,
     resolution,
     runs_of,
     spread,
@@ -107,6 +109,12 @@ def test_products_at_all_shifts_are_those_of_a_correlation(n: int, m: int) -> No
     assert products_of(a, b) == pytest.approx(signal.correlate(a, b, mode="full", method="direct"), abs=1e-10)
 
 
+def test_quick_lengths_are_the_least_products_of_2_3_and_5():
+    products = {2**a * 3**b * 5**c for a in range(12) for b in range(8) for c in range(6)}
+    for count in range(1, 2000):
+        assert quick_length(count) == min(n for n in products if n >= count)
+
+
 @pytest.mark.parametrize("rows", [1, 2, 3, 8, 30])
 def test_holes_are_filled_as_a_closing_does(rows: int) -> None:
     """The closing of images: dilated, then eroded by a line of one more than the longest hole."""
@@ -140,3 +148,11 @@ def test_medians_and_spreads_over_windows_are_those_of_image_filters(count):
     for rows in (1, 2, 3, 7, 8):
         expected = ndimage.maximum_filter1d(values, rows) - ndimage.minimum_filter1d(values, rows)
         assert np.array_equal(spread(values, rows), expected)
+
+
+@pytest.mark.parametrize(("rows", "more"), [(50, 7), (31_000, 400), (95_000, 400)])
+def test_products_near_are_those_of_the_whole_transform(rows, more):
+    rng = np.random.default_rng(rows)
+    a, b = rng.normal(size=rows + more), rng.normal(size=rows)
+    whole = products_of(a, b)[rows - 1 : rows + more]
+    assert products_near(a, b) == pytest.approx(whole, rel=1e-9, abs=1e-9 * np.sqrt(rows))

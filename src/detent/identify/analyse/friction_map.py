@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.identify.analyse.two_speeds import find_steady, find_velocity
+from detent.identify.fit.chance import student_reach
 from detent.identify.fit.estimate import LEVEL, Estimate, estimate, quantile
-from detent.logs.differences import grain, products_of, scipy, smooth, window_rows
+from detent.logs.differences import grain, products_of, smooth, window_rows
 from detent.logs.log import Log, Values
 
 FEWEST_WINDOWS = 5.0  # independent windows of a bin, at least
@@ -204,7 +205,7 @@ def _dip(direction: str, found: list[_Bin], unit: str) -> Dip:
     error = float(np.hypot(lowest.error, least.error))
     degrees = min(lowest.windows, least.windows) - 1.0
     # One-sided, and as many times as there are bins to choose the smallest from (Bonferroni).
-    limit = float(scipy("special").stdtrit(degrees, 1.0 - (1.0 - LEVEL) / len(others)))
+    limit = student_reach((1.0 - LEVEL) / len(others), degrees)
     name, method = f"stribeck.{direction}", f"friction map, {len(bins)} bins"
     return Dip(
         direction, depth > limit * error, estimate(name, depth, unit, error, method, degrees), float(least.speed)

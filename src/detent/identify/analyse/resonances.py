@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from detent.errors import DetentError
 from detent.identify.analyse import response_fit
 from detent.identify.analyse.measure_response import FrequencyResponse
+from detent.identify.fit.chance import fisher_tail
 from detent.identify.fit.estimate import Estimate, estimate
-from detent.logs.differences import scipy
 from detent.logs.log import Values
 
 COHERENT = 0.5  # coherence that the lines about a resonance must have on average for it to be trusted
@@ -134,7 +134,7 @@ def _is_no_better(fit: response_fit.Fit, rigid: response_fit.Fit, lines: respons
     more = len(fit.parameters) - len(rigid.parameters)
     gain = (squares(rigid) - squares(fit)) / more
     ratio = gain / (squares(fit) / fit.freedom)
-    if float(scipy("special").fdtrc(more, fit.freedom, ratio)) > NO_BETTER:
+    if fisher_tail(ratio, more, fit.freedom) > NO_BETTER:
         rigid_too = f"one rigid mass explains the response as well as two (F = {ratio:.2g})"
         band = f"{lines.frequency[0]:.4g} to {lines.frequency[-1]:.4g} Hz"
         advice = "excite higher frequencies, or treat the axis as rigid"

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
+from detent.identify.fit.chance import fisher_tail
 from detent.identify.fit.estimate import Estimate, coloured_covariance, estimate
 from detent.identify.fit.search import root_within
-from detent.logs.differences import grain, scipy
+from detent.logs.differences import grain
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
 
@@ -290,7 +291,7 @@ def _scatter_between(columns: Values, effort: Values, pooled: Values, degrees: f
         residual = effort - columns @ (_pull(columns, size) @ effort)
         return float(residual @ (residual / size)) - free
 
-    if free < 1 or float(scipy("special").fdtrc(free, degrees, (excess(0.0) + free) / free)) > UNLIKELY:
+    if free < 1 or fisher_tail((excess(0.0) + free) / free, free, degrees) > UNLIKELY:
         return 0.0
     most = float(np.ptp(effort)) + float(np.sqrt(pooled.max()))
     return root_within(excess, 0.0, 10.0 * most)

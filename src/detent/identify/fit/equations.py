@@ -21,7 +21,7 @@ Messenger, Bortz: Weak SINDy: Galerkin-based data-driven model selection. Multis
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +107,7 @@ def make_run(log: Log, effort: str | None = None) -> Run:
     # What drives stands from each of its samples to the next.
     is_even = len(grid) == len(log.t) and float(np.abs(grid - log.t).max()) < 0.2 * step
     places = np.clip(np.searchsorted(log.t, grid + 0.2 * step, side="right") - 1, 0, len(log.t) - 1)
-    held = (values if is_even else values[places]).astype(np.float64)
+    held = (values if is_even else values[places]).astype(np.float64, copy=False)
     units, noise = (log.units[name] or "1", log.units["position"]), max(noise_of(position), 0.29 * resolution)
     usable = _usable(log, grid, name)
     return Run(log.name, step, position, held, usable, name, *units, reference, resolution, noise)
@@ -237,12 +237,22 @@ def _held(half: int, late: float) -> tuple[Values, Values]:
 def _sums(signal: Values, weights: Values, rows: Rows) -> Values:
     """Weighted sum around each of some samples; the signal keeps its end values beyond its ends."""
     half = len(weights) // 2
+    if _are_inside(rows, half, len(signal)):
+        return _weighted(signal, weights, rows - half)
     return _weighted(np.concatenate([np.full(half, signal[0]), signal, np.full(half, signal[-1])]), weights, rows)
 
 
 def _way_sums(position: Values, weights: Values, rows: Rows) -> Values:
     """The same for weights that add up to 0, by the ways between samples."""
-    return _weighted(np.pad(np.diff(position), len(weights) // 2), _way_weights(weights), rows)
+    half, ways = len(weights) // 2, np.diff(position)
+    if _are_inside(rows, half, len(position)):
+        return _weighted(ways, _way_weights(weights), rows - half)
+    return _weighted(np.pad(ways, half), _way_weights(weights), rows)
+
+
+def _are_inside(rows: Rows, half: int, count: int) -> bool:
+    """True where a signal of so many samples need not be continued beyond its ends: that would be a copy of it."""
+    return len(rows) > 0 and half <= int(rows.min()) and int(rows.max()) < count - half
 
 
 def _way_weights(weights: Values) -> Values:
@@ -266,7 +276,7 @@ def _weighted(padded: Values, weights: Values, rows: Rows) -> Values:
 # ---- the equation of motion
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """What a position says, window by window, each of shape (m,) unless said otherwise."""
 
@@ -287,15 +297,49 @@ class Motion:
         names = ("position", "velocity", "acceleration", "right", "left", "rows")
         return replace(self, **{name: getattr(self, name)[keep] for name in names})
 
+    # Every model that is tried asks for these, and they are the same for all.
+
+    @cached_property
+    def jerk(self) -> Values:
+        """Third derivative of the position [m/s^3] or in rad."""
+        return self.kernel.jerk(self.places, self.rows)
+
+    @cached_property
+    def sine(self) -> Values:
+        """Mean of the sine of the position."""
+        return self.kernel.mean(np.sin(self.places), self.rows)
+
+    @cached_property
+    def cosine(self) -> Values:
+        """Mean of its cosine."""
+        return self.kernel.mean(np.cos(self.places), self.rows)
+
+    @cached_property
+    def slowest(self) -> tuple[Values, Values]:
+        """Lowest speed within each window to larger positions, and to smaller ones; infinite where there is none."""
+        half, found = self.kernel.half, list[Values]()
+        for speed in (self.quick, -self.quick):
+            moving = np.lib.stride_tricks.sliding_window_view(np.where(speed > 0.0, speed, np.inf), 2 * half + 1)
+            blocks = np.array_split(self.rows - half, 1 + len(self.rows) * (2 * half + 1) // BLOCK)
+            found.append(np.concatenate([moving[block].min(axis=1) for block in blocks]))
+        return found[0], found[1]
+
+    @cached_property
+    def driving(self) -> tuple[Values, Values]:
+        """Shares of each window in which the effort acts along the motion, and against it."""
+        with_motion = np.sign(self.effort) * np.sign(self.quick)
+        along, against = (self.kernel.mean((with_motion == sign).astype(float), self.rows) for sign in (1.0, -1.0))
+        return along, against
+
 
 def fine_kernel(kernel: Kernel) -> Kernel:
     """The short window that tells the direction."""
     return make_kernel(min(kernel.half, max(FINEST, round(FINE / kernel.step))), kernel.step)
 
 
-def make_motion(position: Values, effort: Values, kernel: Kernel, rows: Rows) -> Motion:
-    """Position, velocity and acceleration by a window."""
-    quick = fine_kernel(kernel).velocities(position)
+def make_motion(position: Values, effort: Values, kernel: Kernel, rows: Rows, quick: Values | None = None) -> Motion:
+    """Position, velocity and acceleration by a window; `quick` is the velocity by `fine_kernel`, where it is known."""
+    quick = fine_kernel(kernel).velocities(position) if quick is None else quick
     still = 0.5 * (quick == 0.0)
     right, left = (kernel.mean(way + still, rows) for way in (quick > 0.0, quick < 0.0))
     place, acceleration = kernel.mean(position, rows), kernel.acceleration(position, rows)
@@ -309,11 +353,16 @@ Term = Callable[[Motion, float], Values]
 
 def _bristle(m: Motion, stribeck: float, sense: int) -> Values:
     """Part of the low-speed friction that is left at each sample, in one direction."""
-    speed = m.quick * sense
-    left = np.where(speed > 0.0, np.exp(-LOST), 0.0)
-    slow = np.flatnonzero((speed > 0.0) & (speed < 1.01 * math.sqrt(LOST) * stribeck))
+    # Most windows see nothing slow: what is left in them is `LOST`, as long as they go this way.
+    way, least = (m.right, m.slowest[0]) if sense > 0 else (m.left, m.slowest[1])
+    found, quickest = math.exp(-LOST) * way, 1.01 * math.sqrt(LOST) * stribeck
+    seen = least < quickest
+    speed = m.quick if sense > 0 else -m.quick
+    slow = np.flatnonzero((speed > 0.0) & (speed < quickest))
+    left = np.where(speed > 0.0, math.exp(-LOST), 0.0)
     left[slow] = np.exp(-np.minimum((speed[slow] / stribeck) ** 2, LOST))
-    return sense * m.kernel.mean(left, m.rows)
+    found[seen] = m.kernel.mean(left, m.rows[seen])
+    return sense * found
 
 
 TERMS: Mapping[str, Term] = {
@@ -327,8 +376,8 @@ TERMS: Mapping[str, Term] = {
     "viscous.negative": lambda m, _: np.minimum(m.velocity, 0.0),
     "excess.positive": lambda m, s: _bristle(m, s, 1),
     "excess.negative": lambda m, s: _bristle(m, s, -1),
-    "pendulum": lambda m, _: m.kernel.mean(np.sin(m.places), m.rows),
-    "pendulum.across": lambda m, _: m.kernel.mean(np.cos(m.places), m.rows),
+    "pendulum": lambda m, _: m.sine,
+    "pendulum.across": lambda m, _: m.cosine,
     "spring": lambda m, _: m.position,
 }
 """Every term of an equation of motion; `excess` is static less Coulomb friction."""
@@ -349,8 +398,8 @@ def model_columns(m: Motion, names: Sequence[str], bend: float) -> Values:
     columns = np.column_stack([TERMS[name](m, bend) for name in terms_of(names)])
     if LOSS not in names:
         return columns
-    with_motion = np.sign(m.effort) * np.sign(m.quick)
-    return columns * m.kernel.mean(1.0 / (1.0 - bend * with_motion), m.rows)[:, None]
+    along, against = m.driving
+    return columns * (1.0 + along * (bend / (1.0 - bend)) - against * (bend / (1.0 + bend)))[:, None]
 
 
 def standstill_velocity(run: Run, kernel: Kernel) -> float:
@@ -360,11 +409,11 @@ def standstill_velocity(run: Run, kernel: Kernel) -> float:
     return max(NOISES * noise, 0.5 * count)
 
 
-def usable_rows(run: Run, kernel: Kernel) -> Rows:
-    """Samples, evenly spaced, around which the equation of motion holds for a whole window."""
+def usable_rows(run: Run, kernel: Kernel, quick: Values | None = None) -> Rows:
+    """Samples, evenly spaced, around which the equation of motion holds for a whole window; `quick` as of a motion."""
     half, n = kernel.half, len(run.position)
     fine = fine_kernel(kernel)
-    quick = fine.velocities(run.position)
+    quick = fine.velocities(run.position) if quick is None else quick
     bad = ~run.usable | (np.abs(quick) <= standstill_velocity(run, fine))
     bad[:-1] |= quick[1:] * quick[:-1] < 0.0
     before = np.concatenate([[0], np.cumsum(bad)])

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from detent.identify.fit.chance import student_reach
 from detent.logs.differences import scipy
 from detent.logs.log import Values
 
@@ -109,9 +110,7 @@ def quantile(degrees: float) -> float:
     >>> round(quantile(float("inf")), 3), round(quantile(10), 3)
     (1.96, 2.228)
     """
-    # SciPy's stats package calls the same functions, and takes longer to load than most logs to identify.
-    special, upper = scipy("special"), 0.5 * (1.0 + LEVEL)
-    return float(special.ndtri(upper) if np.isinf(degrees) else special.stdtrit(max(degrees, 1.0), upper))
+    return student_reach(0.5 * (1.0 - LEVEL), max(degrees, 1.0))
 
 
 def independent_rows(residual: Values) -> float:
@@ -150,8 +149,17 @@ def count_cosines(rows: int, independent: float) -> int:
 
 def long_run_variance(scores: Values, cosines: int) -> Values:
     """Long-run covariance of rows in their order of time."""
-    projected: Values = scipy("fft").dct(scores, axis=0, norm="ortho")[1 : cosines + 1]
+    projected = _cosine_sums(scores, cosines)
     return projected.T @ projected / len(projected)
+
+
+def _cosine_sums(rows: Values, cosines: int) -> Values:
+    """The cosine transform of rows, the first without the mean, by Fourier's (Makhoul, IEEE Trans. ASSP 28 (1980))."""
+    # SciPy has it; its package takes longer to load than most logs to identify.
+    n = len(rows)
+    spectrum = np.fft.fft(np.concatenate([rows[::2], rows[1::2][::-1]]), axis=0)[1 : cosines + 1]
+    turned = spectrum * np.exp(-0.5j * np.pi / n * np.arange(1, len(spectrum) + 1))[:, None]
+    return np.sqrt(2.0 / n) * turned.real
 
 
 def coloured_covariance(
@@ -198,13 +206,14 @@ def column_sizes(columns: Values) -> Values:
 def _lagged_variance(scores: Values, memory: float) -> Values:
     """Long-run covariance by weighted lags, as far as residuals remember (Newey, West 1987; Stock, Watson, 15.4)."""
     # It and the projections err independently; the larger of both does not leave an interval too short by chance.
+    # Weights that fall to 0 in a straight line are those of the products of moving sums: one pass for all lags.
     n = len(scores)
     lags = min(round(max(4.0, 0.75 * n ** (1.0 / 3.0), 3.0 * memory)), n - 1)
-    total = scores.T @ scores
-    for lag in range(1, lags + 1):
-        product = scores[lag:].T @ scores[:-lag]
-        total = total + (1.0 - lag / (lags + 1.0)) * (product + product.T)
-    return total / n
+    added = np.zeros((n + 2 * lags + 1, scores.shape[1]))
+    np.cumsum(scores, axis=0, out=added[lags + 1 : lags + 1 + n])
+    added[lags + 1 + n :] = added[lags + n]
+    moving = added[lags + 1 :] - added[: -lags - 1]
+    return moving.T @ moving / (n * (lags + 1.0))
 
 
 def known_noise_covariance(

@@ -70,8 +70,9 @@ class Plant:
         cascade.switch_on(self._params, r, position - self._hanging)
         r.plant.machine.motor.velocity = r.plant.machine.load.velocity = velocity
         ticks = (samples - 1) * self.ticks
-        at = np.arange(ticks) + begin * self.ticks - self._late
-        command = effort[np.clip(at // self.ticks, 0, len(effort) - 1)]
+        first, into = divmod(begin * self.ticks - self._late, self.ticks)
+        held = effort[np.clip(np.arange(first, first + samples), 0, len(effort) - 1)]
+        command = np.repeat(held, self.ticks)[into : into + ticks]
         rows = np.zeros((samples, 8), np.uint8)
         advance(self._params, r, ticks, rows, _PICKS, self.ticks, *cascade.driven(command))
         moved = rows.view(np.float64)[:, 0] + self._hanging
@@ -169,12 +170,17 @@ def free_spread(constants: Constants, runs: Sequence[Run]) -> float:
     for run in runs:
         middle = free_run(constants, run)
         way = max(way, float(np.ptp(middle)))
-        changes = np.array([_change(constants, k, run) - middle for k in range(len(errors))])
         nudges = np.array([_nudge(constants, k, run.step) for k in range(len(errors))])
-        changes *= np.where(errors > 0.0, errors / nudges, 0.0)[:, None]
-        # In one order on every processor.
-        rows = [row * (r[:, None] * changes).sum(axis=0) for r, row in zip(constants.correlation, changes, strict=True)]
-        found.append(np.array(rows).sum(axis=0))
+        factors = np.where(errors > 0.0, errors / nudges, 0.0).tolist()
+        changes = [(_change(constants, k, run) - middle) * factor for k, factor in enumerate(factors)]
+        # In one order on every processor, and without a second copy of all.
+        square = np.zeros(len(middle))
+        for correlated, change in zip(constants.correlation.tolist(), changes, strict=True):
+            others = np.zeros(len(middle))
+            for weight, other in zip(correlated, changes, strict=True):
+                others += weight * other
+            square += change * others
+        found.append(square)
     spread = quantile(float(constants.degrees.min())) * math.sqrt(max(float(np.mean(np.concatenate(found))), 0.0))
     return spread if spread < FARTHEST * way else math.nan
 

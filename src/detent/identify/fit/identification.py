@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -313,15 +314,16 @@ def _follows(part: Prepared) -> bool:
 def prepare_all(runs: Sequence[Run], instruments: Instruments) -> list[Prepared]:
     """Windows wide enough that noise does not matter, the same for all runs."""
     half = WINDOW
+    before: Sequence[Prepared | None] = [None for _ in runs]
     while True:
         kernels = [make_kernel(max(5, round(half / run.step)), run.step) for run in runs]
-        parts = [prepare(run, kernel, instruments) for run, kernel in zip(runs, kernels, strict=True)]
+        parts = [prepare(r, k, instruments, like) for r, k, like in zip(runs, kernels, before, strict=True)]
         seconds = [float(kernel.second @ kernel.second) for kernel in kernels]
         noise = sum(len(p.motion.rows) * p.run.noise**2 * s for p, s in zip(parts, seconds, strict=True))
         power = sum(float(np.sum(p.motion.acceleration**2)) for p in parts)
         if half >= WIDEST or (noise / power if power > 0.0 else 0.0) < NOISE_SHARE[instruments]:
             return parts
-        half *= 1.4
+        half, before = 1.4 * half, parts
 
 
 def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run]) -> tuple[Rung, ...]:
@@ -370,9 +372,10 @@ def _fit_usual(
 
 def _told_odd(log: Log, run: Run, rows: Rows) -> str:
     """Windows that were left out, by the rows of the file in their middles."""
-    places = np.clip(np.searchsorted(log.t, log.t[0] + rows * run.step), 0, len(log.t) - 1)
-    cuts = np.flatnonzero(np.diff(rows) > 2 * WINDOW / run.step) + 1
-    named = [(int(log.rows[part[0]]), int(log.rows[part[-1]])) for part in np.split(places, cuts)]
+    times = np.asarray(log.t[0] + rows * run.step, np.float64)
+    places = log.rows[np.minimum(np.searchsorted(log.t, times), len(log.t) - 1)].tolist()
+    cuts = (np.flatnonzero(np.diff(rows) > 2 * WINDOW / run.step) + 1).tolist()
+    named = [(places[first], places[last - 1]) for first, last in pairwise([0, *cuts, len(rows)])]
     return f"{log.name}: left out about {tell_rows(named)}: the effort there is not that of the rest of the log"
 
 
@@ -411,6 +414,7 @@ def _test_simulation(
     if sum(len(p.motion.rows) for p in parts) < 3 * len(fit.names):
         return None, (), None
     constants = constants_of(fit_rung(parts, rung))
+    del parts  # a simulation takes as much memory
     if constants.value("mass") <= 0.0:
         return None, (), None
     if method == "output error":

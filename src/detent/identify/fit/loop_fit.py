@@ -67,30 +67,34 @@ def fit_loops(run: Run) -> Loops | None:
 def _trials(run: Run, reference: Values) -> Iterator["_Trial"]:
     """Every structure that is tried, the simplest first."""
     step, count = run.step, len(reference)
-    velocity, acceleration = motion_asked(run, reference)
     rows = np.flatnonzero(run.usable)
     rows = rows[(rows >= max(SPANS) + 3) & (rows < count - 3)]
     rows = rows[:: max(1, len(rows) // MOST_ROWS)]
     if len(rows) < 10 * max(SPANS):
         return
-    feeds = [series[rows] for series in (acceleration, velocity, np.sign(velocity), np.ones(count))]
+    velocity, acceleration = motion_asked(run, reference)
+    way, late = (np.cumsum(signal)[rows] * step for signal in (velocity, reference - run.position))
+    velocity, acceleration = velocity[rows], acceleration[rows]
+    feeds, effort = [acceleration, velocity, np.sign(velocity), np.ones(len(rows))], run.effort[rows]
+    error = reference[rows] - run.position[rows]
     for span in SPANS:
-        moved = np.zeros(count)
-        moved[span:] = (run.position[span:] - run.position[:-span]) / (span * step)
+        moved = (run.position[rows] - run.position[rows - span]) / (span * step)
+        gone = np.zeros(count)
+        np.subtract(run.position[span:], run.position[:-span], out=gone[span:])
+        gone = np.cumsum(gone, out=gone)[rows] / span
         # Without an integral a share of the velocity and a viscous feedforward are one and the same.
         for share, loops in ((0.0, 1), (0.0, 2), (1.0, 2)):
-            pair = [reference - run.position, share * velocity - moved]
-            integrals = [np.cumsum(signal) * step for signal in pair] if loops == 2 else []
-            told = [signal[rows] for signal in (*pair, *integrals)]
-            yield _Trial(np.column_stack([*told, *feeds]), run.effort[rows], span, share, loops)
+            integrals = [late, share * way - gone] if loops == 2 else []
+            signals = [error, share * velocity - moved, *integrals, *feeds, effort]
+            yield _Trial(np.column_stack(signals), span, share, loops)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trial:
     """One structure."""
 
-    signals: Values  # error and demand, with an integral theirs too, then what is fed forward
-    effort: Values
+    # error and demand, with an integral theirs too, then what is fed forward, and the effort, shape (n, m)
+    signals: Values
     span: int  # and share: as of `Loops`
     share: float
     loops: int  # 2 with an integral, else 1
@@ -104,22 +108,35 @@ class _Trial:
         mixed[2 * loops :, loops:] = np.eye(count - 2 * loops)
         return mixed
 
-    def solve(self, feeds: tuple[int, ...] = (0, 1, 2)) -> Loops | None:
+    def solve(self) -> Loops | None:
         """The best gains, without feedforward that is slight or against the motion; None where they hold no axis."""
-        effort, first = self.effort, self.loops
-        cut = round(SEEN * len(effort))
-        parts = np.ascontiguousarray(self.signals[:, [*range(2 * first), *(2 * first + f for f in feeds), -1]])
-        gain = self._search(parts[:cut], effort[:cut])
-        columns = parts @ self.mix(gain, parts.shape[1])
-        seen = columns[:cut]
-        theta = np.array([significant(value) for value in _solve(seen.T @ seen, seen.T @ effort[:cut]).tolist()])
-        rest, least = effort[cut:], SLIGHT * rms(effort)
-        if not (theta[:first] > 0.0).all() or (first == 2 and rms(columns[:, 1] * theta[1]) < least):
+        seen, rest = (part.T @ part for part in np.split(self.signals, [self._cut]))
+        return self._solve(seen, seen + rest, (0, 1, 2))
+
+    @property
+    def _cut(self) -> int:
+        """Samples that are fitted; the rest tests."""
+        return round(SEEN * len(self.signals))
+
+    def _solve(self, seen: Values, products: Values, feeds: tuple[int, ...]) -> Loops | None:
+        """The same with some of the feedforward, from the products of all signals, in the part seen and in all."""
+        first, rest = self.loops, self.signals[self._cut :]
+        taken = [*range(2 * first), *(2 * first + f for f in feeds), -2]
+        own, told = seen[np.ix_(taken, taken)], seen[taken, -1]
+        gain = self._search(own, told)
+        mix = self.mix(gain, len(taken))
+        theta = np.array([significant(value) for value in _solve(mix.T @ own @ mix, mix.T @ told).tolist()])
+        powers = np.diag(mix.T @ products[np.ix_(taken, taken)] @ mix)
+        sizes, size = np.abs(theta) * np.sqrt(np.maximum(powers, 0.0) / len(self.signals)), rms(rest[:, -1])
+        if not (theta[:first] > 0.0).all() or (first == 2 and sizes[1] < SLIGHT * size):
             return None
-        kept = tuple(f for k, f in enumerate(feeds, first) if theta[k] > 0.0 and rms(columns[:, k] * theta[k]) > least)
+        kept = tuple(f for k, f in enumerate(feeds, first) if theta[k] > 0.0 and sizes[k] > SLIGHT * size)
         if kept != feeds:
-            return self.solve(kept)
-        error = rms(rest - columns[cut:] @ theta) / max(rms(rest), 1e-300)
+            return self._solve(seen, products, kept)
+        # Of loops that are those of the machine next to nothing is left: products of signals would not show it.
+        factors = np.zeros(rest.shape[1])
+        factors[taken], factors[-1] = -mix @ theta, 1.0
+        error = rms(rest @ factors) / max(size, 1e-300)
         known = dict(zip(feeds, theta[first:-1].tolist(), strict=True))
         acceleration, viscous, coulomb = (known.get(f, 0.0) for f in range(3))
         share, integral = self.share, float(theta[1])
@@ -127,9 +144,8 @@ class _Trial:
             share, integral, viscous = viscous / float(theta[0]), 0.0, 0.0
         return Loops(gain, float(theta[0]), integral, self.span, share, acceleration, viscous, coulomb, error)
 
-    def _search(self, parts: Values, effort: Values) -> float:
+    def _search(self, products: Values, moments: Values) -> float:
         """The position gain with the least error: the best of a few, then between its neighbours."""
-        products, moments = parts.T @ parts, parts.T @ effort
 
         def miss(logarithm: float) -> float:
             """Square of the error, less that of the effort."""
@@ -140,7 +156,7 @@ class _Trial:
         grid: list[float] = np.linspace(math.log(GAINS[0]), math.log(GAINS[1]), 9).tolist()
         best = int(np.argmin([miss(g) for g in grid]))
         around = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-        found = least_within(miss, *around)
+        found = least_within(miss, *around, accuracy=0.1 * REACH)
         # Near its least the error is flat, and rounding decides where the search ends: its slope tells the place.
         for _ in range(2):
             less, least, more = miss(found - REACH), miss(found), miss(found + REACH)

@@ -13,13 +13,15 @@ windows take its place: those 2.5 times as wide hold 2.6 % of the white noise in
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from detent.identify.fit import equations
-from detent.identify.fit.equations import Run
+from detent.identify.fit.equations import Run, make_motion
 from detent.identify.fit.estimate import RANK, carried_degrees, coloured_covariance, column_sizes, independent_rows, rms
+from detent.logs.differences import MOST_ROWS
 from detent.logs.log import Values
 
 Instruments = Literal["reference", "position", "none"]
@@ -31,7 +33,7 @@ SHARED = 1e-3  # part of a constant in a sum that nothing tells, from which on i
 UNKNOWN = 1e6  # standard error, in largest efforts, of a constant that nothing in the log excites
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Prepared:
     """A run with its windows, of which the columns of any model are made."""
 
@@ -41,6 +43,25 @@ class Prepared:
     # wider windows; or `motion` itself, which is least squares
     ideal: equations.Motion
     instruments: Instruments  # which of these: "reference", "position" or "none"
+
+    def effort(self, delay: float) -> Values:
+        """Effort over the windows that acts `delay` [s] later than recorded, shape (m,)."""
+        return self._undelayed[0] if delay == 0.0 else self._held(delay)
+
+    def slope(self, delay: float) -> Values:
+        """Its first derivative, likewise."""
+        return self._undelayed[1] if delay == 0.0 else self._held_slope(delay)
+
+    @cached_property
+    def _undelayed(self) -> tuple[Values, Values]:
+        """Both without a delay, which the search for it begins with in every model."""
+        return self._held(0.0), self._held_slope(0.0)
+
+    def _held(self, delay: float) -> Values:
+        return self.motion.kernel.held(self.run.effort, self.motion.rows, delay / self.run.step)
+
+    def _held_slope(self, delay: float) -> Values:
+        return self.motion.kernel.held_slope(self.run.effort, self.motion.rows, delay / self.run.step)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,19 +120,26 @@ def residuals_of(fit: Fit) -> Residuals:
     return Residuals(size, relative, float(np.abs(e).max()), neighbours, independent_rows(e), len(e))
 
 
-def prepare(run: Run, kernel: equations.Kernel, instruments: Instruments) -> Prepared:
-    """Make the windows of a run."""
-    rows, n = equations.usable_rows(run, kernel), len(run.position)
+def prepare(run: Run, kernel: equations.Kernel, instruments: Instruments, like: Prepared | None = None) -> Prepared:
+    """Make the windows of a run; `like` is the same by other windows, of which what no window changes is taken."""
+    fine, n = equations.fine_kernel(kernel), len(run.position)
+    if like is None or like.instruments != instruments or equations.fine_kernel(like.motion.kernel).half != fine.half:
+        like = None
+    quick = like.motion.quick if like else fine.velocities(run.position)
+    rows = equations.usable_rows(run, kernel, quick)
     if instruments == "position":
         wide = equations.make_kernel(max(min(round(WIDER * kernel.half), round(ENDS * n)), kernel.half), run.step)
         rows = rows[(rows > wide.half) & (rows < n - wide.half)]
-        ideal = equations.make_motion(run.position, run.effort, wide, rows)
-        return Prepared(run, equations.make_motion(run.position, run.effort, kernel, rows), ideal, instruments)
-    motion = ideal = equations.make_motion(run.position, run.effort, kernel, rows)
-    if instruments == "reference" and run.reference is not None:
+        known = quick if equations.fine_kernel(wide).half == fine.half else None
+        ideal = make_motion(run.position, run.effort, wide, rows, known)
+        return Prepared(run, make_motion(run.position, run.effort, kernel, rows, quick), ideal, instruments)
+    motion = ideal = make_motion(run.position, run.effort, kernel, rows, quick)
+    if like and like.ideal is not like.motion:
+        ideal = make_motion(like.ideal.places, run.effort, kernel, rows, like.ideal.quick)
+    elif like is None and instruments == "reference" and run.reference is not None:
         lag = lag_of(run.reference, run)
         delayed = np.concatenate([np.full(lag, run.reference[0]), run.reference[: n - lag]])
-        ideal = equations.make_motion(delayed, run.effort, kernel, rows)
+        ideal = make_motion(delayed, run.effort, kernel, rows)
     return Prepared(run, motion, ideal, instruments)
 
 
@@ -119,8 +147,8 @@ def lag_of(reference: Values, run: Run) -> int:
     """Samples by which the position follows the reference: where their changes agree best."""
     asked, done = reference - reference[0], run.position - run.position[0]
     most = max(min(round(0.25 / run.step), len(asked) // 4), 1)
-    lags = range(0, most, max(1, most // 100))
-    miss = [float(np.abs(done[lag:] - asked[: len(asked) - lag]).mean()) for lag in lags]
+    lags, every = range(0, most, max(1, most // 100)), max(1, len(asked) // MOST_ROWS)
+    miss = [float(np.abs(done[lag::every] - asked[: len(asked) - lag : every]).mean()) for lag in lags]
     return lags[int(np.argmin(miss))]
 
 
@@ -132,7 +160,7 @@ def make_columns(parts: Sequence[Prepared], names: Sequence[str], bend: float, *
 
 def make_effort(parts: Sequence[Prepared], delay: float) -> Values:
     """Effort that acts `delay` [s] later than recorded, over all windows, shape (m,)."""
-    return np.concatenate([p.motion.kernel.held(p.run.effort, p.motion.rows, delay / p.run.step) for p in parts])
+    return np.concatenate([p.effort(delay) for p in parts])
 
 
 class Solved(NamedTuple):
@@ -200,15 +228,14 @@ def _with_delay(  # noqa: PLR0913 - all that a model consists of
     parts: Sequence[Prepared], names: Sequence[str], theta: Values, late: float, columns: Values, ideal: Values
 ) -> tuple[Values, Values]:
     """Columns and instruments with that of the delay."""
-    slope = np.concatenate([p.motion.kernel.held_slope(p.run.effort, p.motion.rows, late / p.run.step) for p in parts])
-    x = np.column_stack([columns, slope])
+    x = np.column_stack([columns, np.concatenate([p.slope(late) for p in parts])])
     if ideal is columns:
         return x, x
     # What the instruments say of the effort's derivative, once mass and viscous friction are roughly known.
     known = dict(zip(equations.terms_of(names), theta.tolist(), strict=True))
     mass, viscous = known["mass"] or 1.0, max(known.get("viscous", known.get("viscous.positive", 0.0)), 0.0)
     motions = [p.ideal for p in parts]
-    tool = np.concatenate([mass * m.kernel.jerk(m.places, m.rows) + viscous * m.acceleration for m in motions])
+    tool = np.concatenate([mass * m.jerk + viscous * m.acceleration for m in motions])
     return x, np.column_stack([ideal, tool])
 
 

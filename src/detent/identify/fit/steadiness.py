@@ -22,8 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 from detent.identify.fit import equations, regression
+from detent.identify.fit.chance import student_reach
 from detent.identify.fit.estimate import carried_degrees, coloured_covariance, quantile, rms
-from detent.logs.differences import scipy
 from detent.logs.log import Values
 
 # Probability of a change as clear by chance, in each direction: of one constant with one course of time, and of the
@@ -106,8 +106,7 @@ def _amplitude(look: _Look, x: Values, z: Values, rest: Values) -> tuple[float, 
     left = rest - amplitude * column[:, 0]
     covariance, cosines = coloured_covariance(column, left, tool, others=x.shape[1])
     degrees = float(carried_degrees(column, left, tool, cosines)[0])
-    reach = -float(scipy("special").stdtrit(max(degrees, 1.0), look.chance))
-    return amplitude, reach * float(np.sqrt(max(covariance[0, 0], 0.0)))
+    return amplitude, student_reach(look.chance, max(degrees, 1.0)) * float(np.sqrt(max(covariance[0, 0], 0.0)))
 
 
 def _looks(parts: Sequence[regression.Prepared], fit: regression.Fit, x: Values, z: Values) -> Iterator[_Look]:

@@ -224,7 +224,10 @@ def look_at_constants(run: Run, constants: Constants, parts: Sequence[Prepared])
     top = float(np.quantile(np.abs(velocity), 0.95))
     by_name = {e.name: e for e in constants.estimates(run)}
     acceleration = rms(np.concatenate([p.motion.acceleration for p in parts]))
-    found = [*_not_explained(by_name, effort, acceleration), *_not_told(run, by_name, effort, top, constants.bounded)]
+    found = [
+        *_not_explained(by_name["mass"], effort, acceleration),
+        *_not_told(run, by_name, effort, top, constants.bounded),
+    ]
     refused = {name for refusal in found for name in refusal.constants}
     found += [r for r in _one_speed(run, velocity, by_name) if not refused >= set(r.constants)]
     found += [_bounded(by_name[name]) for name in constants.bounded if name in by_name]
@@ -238,11 +241,10 @@ def _bounded(e: Estimate) -> Refusal:
     return Refusal("at a bound", text, f"record {record}", (e.name,))
 
 
-def _not_explained(by_name: dict[str, Estimate], effort: float, acceleration: float) -> Iterator[Refusal]:
+def _not_explained(mass: Estimate, effort: float, acceleration: float) -> Iterator[Refusal]:
     """A mass that is not known although the axis accelerates: something else takes the effort, and all are wrong."""
-    mass = by_name["mass"]
-    share = min(mass.half * acceleration / max(effort, 1e-300), 9.99)
-    if mass.high > 0.0 and not mass.half < WIDEST_MASS * mass.value and share > UNTOLD_FORCE:
+    share = mass.half * acceleration / max(effort, 1e-300)
+    if mass.high > 0.0 and not mass.half < WIDEST_MASS * mass.value and UNTOLD_FORCE < share < np.inf:
         text = f"mass {mass.value:.4g} +- {mass.half:.2g} {mass.unit}, which leaves {share:.0%} of the effort open"
         yield Refusal("model does not explain the log", text, "look for what else drives the axis, a filter, a delay")
 

@@ -77,7 +77,7 @@ def without(part: regression.Prepared, odd: Rows) -> regression.Prepared:
 def moved_by_windows(parts: Sequence[regression.Prepared], fit: regression.Fit, names: Collection[str]) -> list[Moved]:
     """Those of some constants that other windows move by more than noise does, the furthest moved first."""
     kernels = [equations.make_kernel(round(WIDER * p.motion.kernel.half), p.run.step) for p in parts]
-    wider = [regression.prepare(p.run, kernel, p.instruments) for p, kernel in zip(parts, kernels, strict=True)]
+    wider = [regression.prepare(p.run, kernel, p.instruments, p) for p, kernel in zip(parts, kernels, strict=True)]
     if sum(len(p.motion.rows) for p in wider) < FEWEST * len(fit.names):
         return []
     run, own = parts[0].run, constants_of(fit)

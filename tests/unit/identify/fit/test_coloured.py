@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy import fft
 from scipy.signal import lfilter
 from tests.identify_rig import binomial_bounds
 
 from detent.identify.fit.estimate import (
+    _lagged_variance,
     carried_degrees,
     coloured_covariance,
     count_cosines,
@@ -164,3 +166,23 @@ def test_intervals_hold_for_a_constant_that_few_rows_carry():
     low, _ = binomial_bounds(1000, doubt=1e-3)
     assert np.mean(held, axis=0).min() > low
     assert np.mean(short, axis=0)[1] < low
+
+
+@pytest.mark.parametrize("rows", [4, 5, 24, 25, 2452])
+def test_its_cosines_are_scipys(rows):
+    scores = np.random.default_rng(rows).normal(size=(rows, 3))
+    cosines = min(40, rows)
+    projected = fft.dct(scores, axis=0, norm="ortho")[1 : cosines + 1]
+    expected = projected.T @ projected / len(projected)
+    assert long_run_variance(scores, cosines) == pytest.approx(expected, rel=1e-11, abs=1e-13)
+
+
+@pytest.mark.parametrize(("rows", "memory"), [(12, 1.0), (300, 20.0), (2452, 2.0)])
+def test_its_lags_are_those_added_up_one_by_one(rows, memory):
+    scores = autoregressive(np.random.default_rng(rows), (2, rows), 0.8).T
+    lags = min(round(max(4.0, 0.75 * rows ** (1.0 / 3.0), 3.0 * memory)), rows - 1)
+    expected = scores.T @ scores
+    for lag in range(1, lags + 1):
+        product = scores[lag:].T @ scores[:-lag]
+        expected += (1.0 - lag / (lags + 1.0)) * (product + product.T)
+    assert _lagged_variance(scores, memory) == pytest.approx(expected / rows, rel=1e-10, abs=1e-12)

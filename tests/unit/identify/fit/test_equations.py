@@ -8,6 +8,7 @@ from tests.identify_rig import Recorder
 
 from detent.identify.fit.equations import (
     LOSS,
+    LOST,
     TERMS,
     fine_kernel,
     is_bent,
@@ -136,3 +137,29 @@ def test_the_short_window_is_never_longer_than_the_long_one():
     assert fine_kernel(make_kernel(4, 1e-3)).half == 4
     assert fine_kernel(make_kernel(40, 1e-3)).half == 6
     assert fine_kernel(make_kernel(40, 1e-4)).half == 40
+
+
+@pytest.mark.parametrize("share", [1e-3, 0.02, 0.3, 3.0])
+@pytest.mark.parametrize(("way", "sense"), [("positive", 1), ("negative", -1)])
+def test_low_speed_friction_of_windows_is_that_of_all_samples(motion, way, sense, share):
+    """Windows that see nothing slow are not added up."""
+    stribeck, speed = share * float(np.abs(motion.quick).max()), sense * motion.quick
+    left = np.where(speed > 0.0, np.exp(-np.minimum((speed / stribeck) ** 2, LOST)), 0.0)
+    found = TERMS[f"excess.{way}"](motion, stribeck)
+    assert found == pytest.approx(sense * motion.kernel.mean(left, motion.rows), rel=1e-12, abs=1e-21)
+
+
+def test_a_loss_lets_columns_grow_where_the_effort_drives(run, motion):
+    loss, with_motion = 0.3, np.sign(run.effort) * np.sign(motion.quick)
+    grown = motion.kernel.mean(1.0 / (1.0 - loss * with_motion), motion.rows)
+    assert model_columns(motion, ("mass", LOSS), loss)[:, 0] == pytest.approx(motion.acceleration * grown, rel=1e-12)
+
+
+def test_sums_near_the_ends_are_those_of_a_signal_that_goes_on(run):
+    n, wide = len(run.position), make_kernel(10, 2e-3)
+    rows = np.array([0, 5, 10, n // 2, n - 11, n - 1])
+    padded = np.r_[np.full(50, run.effort[0]), run.effort, np.full(50, run.effort[-1])]
+    assert wide.mean(run.effort, rows).tolist() == wide.mean(padded, rows + 50).tolist()
+    still = np.r_[np.full(50, run.position[0]), run.position, np.full(50, run.position[-1])]
+    for of in (wide.velocity, wide.acceleration, wide.jerk):
+        assert of(run.position, rows).tolist() == of(still, rows + 50).tolist()

@@ -187,3 +187,14 @@ def test_solving_does_not_mind_units():
     assert solve(z, x, x @ theta) == pytest.approx(theta)
     x[:, 1] = 0.0
     assert solve(x, x, x @ theta) == pytest.approx([1.0, 0.0, 3.0])
+
+
+@pytest.mark.parametrize("instruments", ["reference", "position", "none"])
+def test_windows_like_others_are_those_made_anew(instruments):
+    run = Recorder(position_noise=1e-6).run()
+    narrow, wide = (make_kernel(half, run.step) for half in (20, 30))
+    anew, like = prepare(run, wide, instruments), prepare(run, wide, instruments, prepare(run, narrow, instruments))
+    for one, other in ((anew.motion, like.motion), (anew.ideal, like.ideal)):
+        assert (one.rows == other.rows).all()
+        for name in ("position", "velocity", "acceleration", "right", "left", "quick", "places"):
+            assert (getattr(one, name) == getattr(other, name)).all(), name
