@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.trust.unseen import UNSEEN
-from tests.trust.wild import CHOSEN, KINDS, Outcome, clean, judge_faults, page
+from tests.trust.wild import CHOSEN, KINDS, Outcome, clean, judge_faults, left_outside, page
 
 LOGS = ("simulated 7005",)
 FEW = tuple(range(0, len(KINDS), 8))
@@ -36,10 +36,18 @@ def test_few_spoilt_logs_are_accepted_and_wrong():
 
 def test_the_page_counts_each_log_once():
     outcomes = [
-        Outcome("a", CHOSEN[0].name, "trusted", disjoint=("mass",), outside=("mass",)),
+        Outcome("a", CHOSEN[0].name, "trusted", disjoint=("mass",), outside=("mass",), beyond=("mass",)),
         Outcome("b", CHOSEN[0].name, "refused"),
         Outcome("a", UNSEEN[0].name, "partly trusted"),
     ]
     text = page(outcomes)
-    assert f"| {CHOSEN[0].name} | 2 | 0 | 1 | 1 | 1 |" in text
-    assert f"| {UNSEEN[0].name} | 1 | 1 | 0 | 0 | 0 |" in text
+    assert f"| {CHOSEN[0].name} | 2 | 0 | 1 | 1 | 1 | 1 |" in text
+    assert f"| {UNSEEN[0].name} | 1 | 1 | 0 | 0 | 0 | 0 |" in text
+
+
+@pytest.mark.parametrize("wider", [1.5, 3.0, 10.0])
+def test_what_a_wider_interval_leaves_outside_by_chance(wider):
+    """The clean value is right within its interval; what noise adds to it has the variance that is on top."""
+    rng = np.random.default_rng(4)
+    added = np.sqrt(wider**2 - 1.0) * rng.normal(size=200_000)
+    assert left_outside(wider) == pytest.approx(float(np.mean(np.abs(added) > 1.96)), abs=0.004)

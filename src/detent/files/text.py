@@ -56,7 +56,9 @@ def lines_of(text: str) -> list[str]:
     """
     if not text:
         return []
-    lines = text.removesuffix("\n").split("\n")
+    lines = text.split("\n")
+    if not lines[-1]:
+        lines.pop()  # the last line ends, too
     return [line.removesuffix("\r") for line in lines] if "\r" in text else lines
 
 

@@ -185,6 +185,19 @@ def test_a_clock_that_drifts_is_told_by_its_steps():
     assert "steps go evenly from 10.03 to 10.47 ms" in finding.text
 
 
+@pytest.mark.parametrize(("back", "is_set"), [(0.5, True), (3.0, False)])
+def test_a_clock_that_is_set_back_is_told_from_one_that_starts_again(back, is_set):
+    """Half a second before it goes on; or from its begin, as for another recording in the same file."""
+    t = 0.01 * np.arange(600)
+    t[300:] -= back
+    draft = draft_of(t)
+    mend_clock(draft)
+    drifting = [finding for finding in draft.findings if finding.kind is Kind.DRIFTING_CLOCK]
+    assert bool(drifting) is is_set
+    for finding in drifting:
+        assert "set back at row 301, by up to 0.49" in finding.text
+
+
 def test_what_is_no_drift_of_a_clock():
     """Less than 2 %; a sampler that waits by chance; one that takes longer turns in a part of the run; a few rows."""
     course, rng = np.linspace(0.0, 1.0, 800), np.random.default_rng(2)

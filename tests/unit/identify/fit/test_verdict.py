@@ -116,6 +116,43 @@ def test_the_age_of_a_signal_that_is_held_is_not_known():
     assert look(force=force[k // 200 * 200]) == []
 
 
+def test_a_position_that_straight_lines_were_drawn_in():
+    log = log_with()
+    position = log.signals["position"]
+    k = np.arange(len(position))
+    drawn = make_log(log.t, log.signals | {"position": np.interp(k, k[::5], position[::5])})
+    (refusal,) = look_at_log(drawn, make_run(drawn))
+    assert (refusal.subject, refusal.constants) == ("coarse time", ("delay",))
+    assert "way is another in every 5th row only" in refusal.text
+
+
+def with_position(change, seconds=8.0):
+    t, reference, position, force = Recorder(seconds=seconds).columns()
+    log = make_log(t, {"position": change(position), "reference": reference, "force": force})
+    return [r.subject for r in look_at_log(log, make_run(log))]
+
+
+def test_a_position_that_leaves_its_reference_is_not_that_of_the_loop():
+    """Counts lost one way, a zero that creeps, a scale that is another from the middle on."""
+
+    def lost(position):
+        ways = np.diff(position, prepend=position[0])
+        return position[0] + np.cumsum(np.where(ways > 0.0, 0.98 * ways, ways))
+
+    def creeping(position):
+        return position + 0.05 * np.ptp(position) * np.linspace(0.0, 1.0, len(position))
+
+    def scaled(position):
+        ways = np.diff(position, prepend=position[0])
+        return position[0] + np.cumsum(np.where(np.arange(len(ways)) > len(ways) // 2, 1.1 * ways, ways))
+
+    for change in (lost, creeping, scaled):
+        assert with_position(change) == ["position leaves its reference"], change
+    # What a loop does all along: it stays behind, overshoots, or goes a part of the way.
+    for follows in (lambda q: q, lambda q: np.r_[np.full(30, q[0]), q[:-30]], lambda q: 0.7 * q, lambda q: 1.03 * q):
+        assert with_position(follows) == []
+
+
 def test_a_position_that_stays_behind_its_reference_is_refused():
     log = log_with()
     reference = Recorder(seconds=2.0).columns()[1]
