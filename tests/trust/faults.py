@@ -26,11 +26,14 @@ class Fault:
         Makes a spoilt table of a clean one.
     needs : str
         Column that a log must have; empty for one that all have.
+    is_another : bool
+        True where what comes of it is the log of another axis, which no log can show.
     """
 
     name: str
     spoil: Spoil
     needs: str = ""
+    is_another: bool = False
 
 
 def period(table: Table) -> float:

@@ -184,7 +184,7 @@ def of_the_command(table: Table, _: np.random.Generator) -> Table:
 
 HARDER = (
     Fault("rows in turn from two sensors, 0.1 % apart", two_sensors),
-    Fault("effort 3 rows early", early(3)),
+    Fault("effort 3 rows early", early(3), is_another=True),
     Fault("5 blocks of 30 rows back to front", reversed_blocks),
     Fault("effort in another unit in the last third", other_unit),
     Fault("an index lost twice, a fifth of the range", turns_lost),
@@ -195,7 +195,7 @@ HARDER = (
     Fault("position behind a coupling that swings", second_order("position", 0.05, 0.3)),
     Fault("effort behind a filter of second order", second_order("effort", 0.7, 0.5)),
     Fault("a tenth of the log moved by hand", by_hand),
-    Fault("effort without what is added for friction", compensated),
+    Fault("effort without what is added for friction", compensated, is_another=True),
     Fault("effort with hysteresis, a tenth of its size", hysteresis),
     Fault("position whose scale goes up and down by 2 %", breathing),
     Fault("effort cut to 40 levels", truncated),
@@ -207,6 +207,6 @@ HARDER = (
     Fault("a sensor one of whose bits is stuck", stuck_bit),
     Fault("position noisy in the second half, 0.3 %", noisy_later),
     Fault("effort 0 in the last third", gone_for_good),
-    Fault("what the reference would need in the place of the effort", of_the_command, "reference"),
+    Fault("what the reference would need in the place of the effort", of_the_command, "reference", is_another=True),
 )
 """All of them."""

@@ -198,9 +198,9 @@ interval wider, and leaves the value outside the clean one by chance: {chance:.0
 as wide. *Beyond*: and its own interval does not hold the value of the clean log either. Rules were chosen with the
 kinds of the first table at hand, and not with those of the second.
 
-Some kinds make logs of other axes, which may exist: another gain of the effort one way where friction is nearly all of
-it, an effort that lacks what is added for friction or is what a mass would need, an effort that stands early by a few
-rows. No log shows these.
+Kinds of the last table make logs of other axes, which may exist, so that no log shows them: an effort that stands early
+is a delay, one that lacks what is added for friction is of an axis with less, one that is what a mass would need of an
+axis with none. So is, where friction is nearly all of the effort, another gain of it one way.
 """
 
 
@@ -218,8 +218,12 @@ def page(outcomes: Sequence[Outcome]) -> str:
     logs = list(dict.fromkeys(o.log for o in outcomes))
     kinds = len({o.fault for o in outcomes})
     text = HEAD.format(kinds=kinds, chance=left_outside(3.0), logs=f"{', '.join(logs[:-1])} and {logs[-1]}")
-    titles = ("Kinds that rules were chosen with", "Kinds that they were not chosen with")
-    for title, part in zip(titles, (CHOSEN, UNSEEN), strict=True):
+    parts = {
+        "Kinds that rules were chosen with": [fault for fault in CHOSEN if not fault.is_another],
+        "Kinds that they were not chosen with": UNSEEN,
+        "What is the log of another axis": [fault for fault in CHOSEN if fault.is_another],
+    }
+    for title, part in parts.items():
         names = [fault.name for fault in part]
         text += f"\n## {title}\n\n{fault_table([o for o in outcomes if o.fault in names])}"
     return text
@@ -237,10 +241,8 @@ def fault_table(outcomes: Sequence[Outcome]) -> str:
 
 
 def _numbers(outcomes: Sequence[Outcome]) -> tuple[int, ...]:
-    wrong, refused, outside, beyond = (
-        sum(map(bool, found))
-        for found in zip(*((o.disjoint, o.is_refused, o.outside, o.beyond) for o in outcomes), strict=True)
-    )
+    wrong, refused = sum(bool(o.disjoint) for o in outcomes), sum(o.is_refused for o in outcomes)
+    outside, beyond = sum(bool(o.outside) for o in outcomes), sum(bool(o.beyond) for o in outcomes)
     return len(outcomes) - wrong - refused, wrong, refused, outside, beyond
 
 

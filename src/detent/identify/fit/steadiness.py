@@ -23,7 +23,7 @@ import numpy as np
 
 from detent.identify.fit import equations, regression
 from detent.identify.fit.chance import student_reach
-from detent.identify.fit.estimate import carried_degrees, coloured_covariance, quantile, rms
+from detent.identify.fit.estimate import RANK, carried_degrees, coloured_covariance, column_sizes, quantile, rms
 from detent.logs.log import Values
 
 # Probability of a change as clear by chance, in each direction: of one constant with one course of time, and of the
@@ -83,8 +83,9 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
     rest, size = effort - regression.combine(x, theta), max(rms(effort), 1e-300)
     limits = {name: quantile(d) * fit.error(name) for name, d in zip(fit.names, fit.degrees.tolist(), strict=True)}
     found: dict[str, tuple[float, Change]] = {}
+    others = _Others(x, z)
     for look in _looks(parts, fit, x, z):
-        amplitude, least = _amplitude(look, x, z, rest)
+        amplitude, least = _amplitude(look, others, rest)
         is_relative = look.name in {"mass", GAIN} and look.mean
         share = abs(amplitude / look.mean) if is_relative else abs(amplitude) * rms(look.column) / size
         clear = abs(amplitude) / max(least, 1e-300)
@@ -94,17 +95,30 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
     return [change for _, change in found.values()]
 
 
-def _amplitude(look: _Look, x: Values, z: Values, rest: Values) -> tuple[float, float]:
+class _Others:
+    """The columns of a model and their instruments, at unit length: what they explain of one more column."""
+
+    def __init__(self, x: Values, z: Values) -> None:
+        self.x, self.z = x / column_sizes(x), z / column_sizes(z)
+        self.products = regression.products(self.z, self.x)
+
+    def left_of(self, column: Values, *, is_tool: bool = False) -> Values:
+        """What they leave of a column, or of an instrument."""
+        by, of, matrix = (self.x, self.z, self.products.T) if is_tool else (self.z, self.x, self.products)
+        share, *_ = np.linalg.lstsq(matrix, regression.products(by, column[:, None])[:, 0], rcond=RANK)
+        return column - regression.combine(of, np.asarray(share, np.float64))
+
+
+def _amplitude(look: _Look, others: _Others, rest: Values) -> tuple[float, float]:
     """Constant of one more column, and the size up to which it is chance; 0 for a column that others explain."""
-    column = look.column - regression.combine(x, regression.solve(z, x, look.column))
-    tool = look.tool - regression.combine(z, regression.solve(x, z, look.tool))
+    column, tool = others.left_of(look.column), others.left_of(look.tool, is_tool=True)
     length = float(np.linalg.norm(tool) * np.linalg.norm(column))
     if length < OWN * float(np.linalg.norm(look.tool) * np.linalg.norm(look.column)):
         return 0.0, 1.0
     column, tool = column[:, None], tool[:, None]
     amplitude = float(regression.solve(tool, column, rest)[0])
     left = rest - amplitude * column[:, 0]
-    covariance, cosines = coloured_covariance(column, left, tool, others=x.shape[1])
+    covariance, cosines = coloured_covariance(column, left, tool, others=others.x.shape[1])
     degrees = float(carried_degrees(column, left, tool, cosines)[0])
     return amplitude, student_reach(look.chance, max(degrees, 1.0)) * float(np.sqrt(max(covariance[0, 0], 0.0)))
 
