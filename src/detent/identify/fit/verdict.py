@@ -15,7 +15,7 @@ from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb, chosen_climb
 from detent.identify.fit.regression import Fit, Prepared, combine, lag_of, make_effort, residuals_of, solve
 from detent.identify.fit.steadiness import FORCE, GAIN, Change
-from detent.identify.fit.windows import Moved
+from detent.identify.fit.windows import MOST_OUT, Moved, sticks_out
 from detent.logs.differences import stepped
 from detent.logs.log import Action, Kind, Log, Severity, Values
 
@@ -311,6 +311,9 @@ def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequ
         most = max(large, key=lambda change: change.share)
         subject = "changes with the motion" if most.is_of_motion else "changes along the log"
         yield Refusal(subject, *_told(run, most, fit))
+    if (share := float(np.mean(sticks_out(fit)))) > MOST_OUT:
+        text = f"in {share:.0%} of the windows the effort is eight times further off than in the others"
+        yield Refusal("model does not explain the log", text, "look for parts that are not of this axis, or not of one")
     delay, step = 1e3 * fit.value("delay"), 1e3 * run.step
     half = 1e3 * quantile(float(fit.degrees[fit.names.index("delay")])) * fit.error("delay")
     is_known = half < WIDEST_DELAY * step

@@ -18,6 +18,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from detent.identify.fit import equations, regression
 from detent.identify.fit.constants import Constants, constants_of
@@ -31,7 +32,7 @@ FEWEST = 3  # windows for each column, at least
 OUT = 8.0  # residual of a window, in the usual size of one, from which it is left out
 LEAST_USUAL = 0.005  # usual size of a residual, over the effort, at least
 USUAL = 1.4826  # standard deviation of normal residuals over the median of their sizes
-MOST_OUT = 0.05  # share of the windows up to which they are: what is more common belongs to the axis
+MOST_OUT = 0.05  # share of the windows up to which they are: what is more common belongs to the log
 COMPARED = ("mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
 
 
@@ -58,12 +59,17 @@ class Moved(NamedTuple):
 
 def odd_windows(parts: Sequence[regression.Prepared], fit: regression.Fit) -> list[Rows]:
     """Samples, of each run, around which the residual is far beyond the usual; none where these are many."""
-    # Where there is no noise the usual residual is what the model lacks, which is an error of all windows.
-    sizes = np.abs(fit.residual)
-    is_odd = sizes > OUT * max(USUAL * float(np.median(sizes)), LEAST_USUAL * rms(fit.effort))
+    is_odd = sticks_out(fit)
     is_odd &= np.mean(is_odd) <= MOST_OUT
     ends = np.cumsum([len(p.motion.rows) for p in parts])[:-1]
     return [p.motion.rows[odd] for p, odd in zip(parts, np.split(is_odd, ends), strict=True)]
+
+
+def sticks_out(fit: regression.Fit) -> NDArray[np.bool_]:
+    """True for each window whose residual is far beyond the usual one."""
+    # Where there is no noise the usual residual is what the model lacks, which is an error of all windows.
+    sizes = np.abs(fit.residual)
+    return sizes > OUT * max(USUAL * float(np.median(sizes)), LEAST_USUAL * rms(fit.effort))
 
 
 def without(part: regression.Prepared, odd: Rows) -> regression.Prepared:
