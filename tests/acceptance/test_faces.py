@@ -1273,7 +1273,9 @@ def test_15_through_the_process_of_the_face_in_wall_time(tmp_path):
         sheet = live.place("canopen", 2).removeprefix("EDS ")
         found = foreign.run("can", "cyclic", "slcan", theirs, "5", sheet)
     assert found["modes"] == 0x3A5
-    assert 19_000 < found["way"] < 21_000  # one that is late is passed on its slope
+    # A set-point that is late is passed on the slope of the last two, 16 mm/s at most, for five periods and no longer;
+    # how late a busy machine is says nothing of the drive.
+    assert 19_000 < found["way"] < 20_000 + 5 * 0.1 * 16_000
     assert found["behind"] < 1_600  # two of its periods at 16 mm/s; a busy machine may be later now and then
     assert abs(found["end"]) < 50
     assert found["state"] == "OPERATION ENABLED"
