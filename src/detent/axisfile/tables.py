@@ -258,6 +258,9 @@ class DisturbanceTable(Table, frozen=True):
     lines: InterferenceTable = Field(default_factory=InterferenceTable)
 
 
+FARTHEST_BACK = 1e3  # farthest way back behind a reference [m]
+
+
 class HomeTable(Table, frozen=True):
     """How a live axis finds its reference; without the table it cannot home."""
 
@@ -275,7 +278,7 @@ class HomeTable(Table, frozen=True):
     )
     back_off: Length = optional(
         "way back before it is approached, and after it was found", math.nan, derived="limits.travel / 50",
-        gt=0.0, le=1e3,
+        gt=0.0, le=FARTHEST_BACK,
     )  # fmt: skip
     edge_to_index: Length = optional(
         "index: way from the edge of the switch back to the mark", math.nan, derived="0.4 turns of the motor",
@@ -290,7 +293,7 @@ class HomeTable(Table, frozen=True):
     def completed(self, ends: tuple[float, float], speed: float, pitch: float) -> Self:
         """The same with what was left to the ends of the travel [m], to the largest speed [m/s] and to a turn [m]."""
         search = speed / 10 if math.isnan(self.speed) else self.speed
-        back = (ends[1] - ends[0]) / 50 if math.isnan(self.back_off) else self.back_off
+        back = min((ends[1] - ends[0]) / 50, FARTHEST_BACK) if math.isnan(self.back_off) else self.back_off
         behind = 0.4 * pitch if math.isnan(self.edge_to_index) else self.edge_to_index
         end = ends[1] if self.side > 0 else ends[0]
         derived = {

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from detent.axisfile.blocks import fill_marks, homing_params
-from detent.axisfile.tables import HomeTable, InnerHomeTable
+from detent.axisfile.tables import FARTHEST_BACK, HomeTable, InnerHomeTable
 from detent.sensing.home_marks import HomeMarksParams
 
 ENDS, SPEED, TURN = (0.0, 1.0), 0.5, 0.01
@@ -23,6 +23,13 @@ def completed(table, **keys):
 def test_between_frames_a_reference_lies_where_it_can_be_passed(by, direction, place):
     assert completed(InnerHomeTable, by=by, direction=direction).position == pytest.approx(place)
     assert completed(HomeTable, by=by, direction=direction).position == pytest.approx(float(place > 0.5))
+
+
+def test_a_travel_of_kilometres_derives_a_way_back_that_the_key_may_have():
+    """A fiftieth of it was more than the file could be written with and read again."""
+    made = HomeTable(by="switch").completed((0.0, 60e3), SPEED, TURN)
+    assert made.back_off == FARTHEST_BACK
+    HomeTable.model_validate({"by": "switch", "back_off": f"{made.back_off} m"})
 
 
 def test_what_is_stated_stays():
