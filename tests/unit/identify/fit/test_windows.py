@@ -10,6 +10,7 @@ from detent.identify.fit.constants import constants_of
 from detent.identify.fit.equations import make_run
 from detent.identify.fit.identification import choose_windows, identify
 from detent.identify.fit.regression import fit_equations
+from detent.identify.fit.verdict import look_at_fit
 from detent.identify.fit.windows import MOST_OUT, MOVED, Moved, moved_by_windows, odd_windows, widened, without
 
 T = np.arange(16000) * 1e-3
@@ -88,12 +89,16 @@ def test_what_pushes_for_a_moment_is_left_out_and_named():
 
 
 @pytest.mark.parametrize(("share", "is_left_out"), [(0.8 * MOST_OUT, True), (1.2 * MOST_OUT, False)])
-def test_what_is_common_belongs_to_the_axis(share, is_left_out):
+def test_what_is_common_is_not_left_out_but_refused(share, is_left_out):
     parts = choose_windows([make_run(log())])
     fit = fit_equations(parts, TERMS)
     rest = np.where(np.arange(len(fit.residual)) < share * len(fit.residual), 100.0, 1.0)
-    (odd,) = odd_windows(parts, replace(fit, residual=rest))
+    other = replace(fit, residual=rest, effort=np.full(len(rest), 10.0))
+    (odd,) = odd_windows(parts, other)
     assert bool(len(odd)) is is_left_out
+    refused = [r for r in look_at_fit(parts, other, 0.0, []) if "eight times further off" in r.text]
+    assert bool(refused) is not is_left_out
+    assert all(r.constants == () for r in refused)
 
 
 def test_no_window_is_left_that_holds_the_middle_of_an_odd_one():
