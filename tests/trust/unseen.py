@@ -1,5 +1,8 @@
 """Faults that no rule was chosen with: written down, judged once, and then left alone.
 
+One has been looked at since it was counted, without a rule that came of it: the amplifier that gives way. Whoever
+chooses rules with these at hand moves them to the others, and writes new ones.
+
 Each spoils the columns of a clean log as those of `faults` do, and makes of it a log that no axis makes.
 """
 

@@ -108,10 +108,14 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
         yield Refusal("coarse time", text, "record the time of each row to a tenth of a period", ("delay",))
     ways = np.diff(log.signals["position"])
     lines = np.round(ways / max(float(np.abs(ways).max(initial=0.0)), 1e-300), ROUNDED)
-    told_by = {"position": log.signals["position"], run.effort_name: log.signals[run.effort_name], "way": lines}
+    told_by = {
+        "position": log.signals["position"],
+        run.effort_name: log.signals[run.effort_name],
+        "the way from row to row": lines,
+    }
     for what, values in told_by.items():
         if 1 < (rows := held_rows(values)) <= LONGEST_HELD / run.step:
-            text = f"{log.name}: {what} is another in every {rows}th row only: how old it is in the others is not known"
+            text = f"{log.name}: {what} changes every {rows} rows only: how old it is in between is not known"
             yield Refusal("coarse time", text, "record each signal as often as the rows are written", ("delay",))
     if gone := _small_values_gone(log.signals[run.effort_name], log.signals["position"]):
         text = f"{log.name}: {run.effort_name} is never between 0 and {gone:.3g} {run.effort_unit}, and 0 in motion"
@@ -313,7 +317,7 @@ def look_at_fit(parts: Sequence[Prepared], fit: Fit, error: float, changes: Sequ
         yield Refusal(subject, *_told(run, most, fit))
     if (share := float(np.mean(sticks_out(fit)))) > MOST_OUT:
         text = f"in {share:.0%} of the windows the effort is eight times further off than in the others"
-        yield Refusal("model does not explain the log", text, "look for parts that are not of this axis, or not of one")
+        yield Refusal("model does not explain the log", text, "look for parts of the log that are not of this axis")
     delay, step = 1e3 * fit.value("delay"), 1e3 * run.step
     half = 1e3 * quantile(float(fit.degrees[fit.names.index("delay")])) * fit.error("delay")
     is_known = half < WIDEST_DELAY * step

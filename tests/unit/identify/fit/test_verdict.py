@@ -111,7 +111,7 @@ def test_the_age_of_a_signal_that_is_held_is_not_known():
     k = np.arange(len(force))
     (refusal,) = look(force=force[k // 5 * 5])
     assert refusal.constants == ("delay",)
-    assert "force is another in every 5th row only" in refusal.text
+    assert "force changes every 5 rows only" in refusal.text
     assert [held_rows(force[rows]) for rows in (k, k // 5 * 5, k // 3 * 3, k - k % (2 + k // 50 % 2))] == [1, 5, 3, 1]
     assert look(force=force[k // 200 * 200]) == []
 
@@ -123,7 +123,7 @@ def test_a_position_that_straight_lines_were_drawn_in():
     drawn = make_log(log.t, log.signals | {"position": np.interp(k, k[::5], position[::5])})
     (refusal,) = look_at_log(drawn, make_run(drawn))
     assert (refusal.subject, refusal.constants) == ("coarse time", ("delay",))
-    assert "way is another in every 5th row only" in refusal.text
+    assert "the way from row to row changes every 5 rows only" in refusal.text
 
 
 def with_position(change, seconds=8.0):
