@@ -149,7 +149,8 @@ def recording_figures(found: Identification, shown: int, *, simulated: bool) -> 
     """What one log holds over time, the faults of all, what was read from which column."""
     run, log = found.runs[shown], found.logs[shown]
     share = 1.0 - float(run.usable.mean())
-    used = f"Shaded: {share:.0%} of the samples, which are not used." if share > 0.0 else "Every sample is used."
+    told = f"{share:.0%}" if share >= 0.01 else f"{share:.2%}"  # a few windows that stick out are few samples
+    used = f"Shaded: {told} of the samples, which are not used." if share > 0.0 else "Every sample is used."
     caption = f"{log.name}: {duration(float(run.t[-1]))} at {1.0 / run.step:.4g} Hz. {used}"
     listed = [_log_figure(found.logs, shown, simulated=simulated)] if len(found.logs) > 1 else []
     return [
