@@ -238,6 +238,7 @@ class LiveAxis:
         left = threading.Event()
 
         def keep() -> None:
+            """Say that this program lives, until the job has ended or is left."""
             with suppress(DetentError):  # the axis has gone, or this process has left it
                 while not left.wait(KEEP_JOB) and not command.done:
                     self.link.ask("keep")

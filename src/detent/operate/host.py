@@ -425,6 +425,7 @@ class Host:
         """Work of a thread beside the loop: an error in it is a fault of the axis, not the silent end of a thread."""
 
         def run() -> None:
+            """The work, and what becomes of an error in it."""
             try:
                 work()
             except Exception as error:  # noqa: BLE001 - whatever it is

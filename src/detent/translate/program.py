@@ -338,6 +338,7 @@ class Program:
                 del constants[name]
 
         def resolved(found: re.Match[str]) -> str:
+            """The constant by its name, converted where it is signed elsewhere."""
             name = found[1]
             wide = "uint32_t" if bits_of(constants[name][0]) > 16 else "unsigned"
             return name if name in alone else f"({wide}){name}"

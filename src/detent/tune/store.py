@@ -100,6 +100,7 @@ def joined(chunks: Sequence[Chunk], cases: int) -> Chunk:
     first = chunks[0]
 
     def columns(kind: str) -> dict[str, Any]:
+        """Values, or results, of all chunks, by their names."""
         return {
             name: np.concatenate([getattr(one, kind)[name] for one in chunks])[:cases] for name in getattr(first, kind)
         }
