@@ -17,6 +17,7 @@ Andrews: Tests for parameter instability and structural change with unknown chan
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +34,9 @@ ROWS_EACH = 8  # windows for each column, at least
 SLIGHT = 0.03  # change to each side, over the mass or in parts of the effort, up to which it only widens the limits
 MOST_OF_MOTION = 0.1  # the same of a mass or a gain that changes with the motion, where it has a mean
 MOST_HALVES = 8  # half waves of a course over a log, at most
+MOST_OVER = 1.5  # size of a sample of the effort over the largest that its windows have, at most
 SIDE = 0.15  # share of what tells a constant that each side of a course holds, at least
+UNEVEN = 0.02  # size of an uneven effort over the effort, from which on its sizes differ
 OWN = 1e-3  # part of a column that no other explains, from which on it is one of its own
 SPEED, SIGN = "with the speed", "with its sign"
 GAIN, FORCE = "gain of the effort", "zero of the effort"  # what may change beside the constants of the model
@@ -82,17 +85,18 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
     theta = regression.solve(z, x, effort)
     rest, size = effort - regression.combine(x, theta), max(rms(effort), 1e-300)
     limits = {name: quantile(d) * fit.error(name) for name, d in zip(fit.names, fit.degrees.tolist(), strict=True)}
-    found: dict[str, tuple[float, Change]] = {}
+    found: dict[str, list[tuple[tuple[bool, float], Change]]] = {}
     others = _Others(x, z)
     for look in _looks(parts, fit, x, z):
         amplitude, least = _amplitude(look, others, rest)
         is_relative = look.name in {"mass", GAIN} and look.mean
         share = abs(amplitude / look.mean) if is_relative else abs(amplitude) * rms(look.column) / size
         clear = abs(amplitude) / max(least, 1e-300)
-        own = limits.get(look.name, 0.0)
-        if clear > max(1.0, found.get(look.name, (0.0,))[0]) and (abs(amplitude) > own or share > SLIGHT):
-            found[look.name] = clear, Change(look.name, look.mean, amplitude, share, look.course)
-    return [change for _, change in found.values()]
+        if clear > 1.0 and (abs(amplitude) > limits.get(look.name, 0.0) or share > SLIGHT):
+            change = Change(look.name, look.mean, amplitude, share, look.course)
+            # A large one is not to be hidden by a slight one that is clearer.
+            found.setdefault(look.name, []).append(((change.is_large, clear), change))
+    return [max(changes, key=itemgetter(0))[1] for changes in found.values()]
 
 
 class _Others:
@@ -133,11 +137,12 @@ def _looks(parts: Sequence[regression.Prepared], fit: regression.Fit, x: Values,
         for k, name in enumerate(terms):
             if _has_sides(x[:, k], along):
                 yield _Look(name, course, x[:, k] * along, z[:, k] * along, float(theta[k]), CHANCE)
-    for course, along in (*_over_time(parts), *_up_and_down(parts)):
+    for course, along in (*_over_time(parts), *_in_short(parts)):
         yield _Look(GAIN, course, effort * along, told * along, 1.0, CHANCE_WHOLE)
         yield _Look(FORCE, course, ones * along, ones * along, 0.0, CHANCE_WHOLE)
     yield _Look(GAIN, SIGN, np.abs(effort), np.abs(told), 1.0, CHANCE_WHOLE)
-    yield _Look(GAIN, "with its size", effort * _level(told), told * _level(told), 1.0, CHANCE_WHOLE)
+    for column, tool in _bent(parts, fit, told):
+        yield _Look(GAIN, "with its size", column, tool, 1.0, CHANCE_WHOLE)
     for course, along in _over_place(parts):
         yield _Look(GAIN, course, effort * along, told * along, 1.0, CHANCE_WHOLE)
     for course, along in _over_motion(parts):
@@ -161,9 +166,13 @@ def _over_time(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Valu
         yield "about 50% of the way along the log", np.where(along > 0.0, 1.0, -1.0)
 
 
-def _up_and_down(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
-    """Courses that come and go over each log, shape (m,), as what drifts and is not one axis does."""
+def _in_short(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
+    """Courses with steps at each tenth of the logs, and that come and go, as what drifts and is not one axis does."""
     along = _time_of(parts)
+    for tenth in (1, 2, 3, 4, 6, 7, 8, 9):
+        later = along > 0.2 * tenth - 1.0
+        if 0.05 < float(np.mean(later)) < 0.95:
+            yield f"about {tenth}0% of the way along the log", np.where(later, 1.0, -1.0)
     for halves in range(2, MOST_HALVES + 1):
         yield f"up and down along the log, in {halves} half waves", np.cos(0.5 * np.pi * halves * (along + 1.0))
 
@@ -171,6 +180,26 @@ def _up_and_down(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Va
 def _time_of(parts: Sequence[regression.Prepared]) -> Values:
     """Time of the windows, from -1 at the begin of each log to 1 at its end."""
     return np.concatenate([2.0 * p.motion.rows / len(p.run.position) - 1.0 for p in parts])
+
+
+def _bent(parts: Sequence[regression.Prepared], fit: regression.Fit, told: Values) -> Iterator[tuple[Values, Values]]:
+    """The effort by an amplifier that is not even, and its instruments: its slope a straight line, and a parabola."""
+    # What the constants follow is the slope, how a small change is passed on: from -1 for nothing to 1 at the top. It
+    # acts on each sample, and an effort that answers to noise has peaks that its windows have not.
+    top = max(float(np.quantile(np.abs(told), 0.98)), 1e-300)
+
+    def bent(effort: Values, power: int) -> Values:
+        return effort * (2.0 / (power + 1) * np.minimum(np.abs(effort) / top, MOST_OVER) ** power - 1.0)
+
+    late = fit.value("delay")
+    effort = regression.make_effort(parts, late)
+    for power in (1, 2):
+        held = [p.motion.kernel.held(bent(p.run.effort, power), p.motion.rows, late / p.run.step) for p in parts]
+        column = np.concatenate(held)
+        # A part of the effort itself, which holds what the model leaves of it, would explain just that.
+        column -= float((column * effort).sum() / max((effort**2).sum(), 1e-300)) * effort
+        if rms(column) > UNEVEN * rms(effort):
+            yield column, bent(told, power)
 
 
 def _over_motion(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:

@@ -65,6 +65,30 @@ def test_a_gain_that_changes_with_time_or_sign():
         assert refusal.constants == ()
 
 
+def test_a_gain_that_is_another_in_the_first_tenth():
+    _, _, found = changes(log(measured=lambda force, t: force * np.where(t < -0.8, 0.8, 1.0)))
+    assert found[GAIN].course == "about 10% of the way along the log"
+    assert abs(found[GAIN].amplitude) == pytest.approx(0.1, rel=0.05)
+
+
+@pytest.mark.parametrize(("most", "large"), [(12.0, False), (7.0, True)])
+def test_an_amplifier_that_gives_way(most, large):
+    """The constants follow its slope, ``1 - (measured / most)^2``: from 1 at nothing to the least at the top."""
+    parts, _, found = changes(log(measured=lambda force, _: most * np.tanh(force / most)))
+    half = 0.5 * float(np.quantile(np.abs(parts[0].run.effort), 0.98) / most) ** 2
+    assert found[GAIN].course == "with its size"
+    assert found[GAIN].amplitude == pytest.approx(-half / (1.0 - half), rel=0.15)
+    assert found[GAIN].is_large == large
+
+
+def test_a_large_change_is_not_hidden_by_a_slight_one_that_is_clearer():
+    """A step of 2 % in the middle of the log, and 4 % with the sign, which noise hides more of."""
+    made = log(measured=lambda f, t: f * (1.0 + 0.02 * np.sign(t)) * np.where(f > 0.0, 1.02, 0.94))
+    _, _, found = changes(made)
+    assert found[GAIN].course == SIGN
+    assert found[GAIN].is_large
+
+
 def test_what_a_change_with_the_motion_may_be():
     """A mass that a coarse sensor blurs holds in its mean; friction is no straight line of the speed."""
     shares = {"mass": 0.1, GAIN: 0.1, "viscous": np.inf}
