@@ -21,12 +21,14 @@ from detent.logs.read_log import read_log
 from tests.places import DATA
 from tests.trust.faults import FAULTS, Table
 from tests.trust.harder_faults import HARDER
+from tests.trust.hidden import CLEAR, standard_errors
+from tests.trust.latest_faults import LATEST
 from tests.trust.more_faults import MORE
 from tests.trust.plants import make_case
 from tests.trust.table import table
 from tests.trust.unseen import UNSEEN
 
-CHOSEN = (*FAULTS, *MORE, *HARDER)
+CHOSEN = (*FAULTS, *MORE, *HARDER, *LATEST)
 KINDS = (*CHOSEN, *UNSEEN)
 """Every kind, by its number."""
 
@@ -66,6 +68,7 @@ class Outcome:
     disjoint: tuple[str, ...] = ()
     outside: tuple[str, ...] = ()
     beyond: tuple[str, ...] = ()
+    hidden: bool = False
 
     @property
     def is_refused(self) -> bool:
@@ -162,14 +165,16 @@ def judge_fault(asked: tuple[str, int]) -> Outcome:
     known = {e.name: e for e in truth(log).trusted}
     both = [(e, known[e.name]) for e in found.trusted if e.name in known]
     said = [str(r)[:160] for r in found.refusals] + [str(f)[:160] for log in found.logs for f in log.findings]
+    outside = [(e, c) for e, c in both if not c.holds(e.value)]
     return Outcome(
         log,
         fault.name,
         found.verdict,
         tuple(said),
         tuple(e.name for e, c in both if e.low > c.high or e.high < c.low),
-        tuple(e.name for e, c in both if not c.holds(e.value)),
-        tuple(e.name for e, c in both if not c.holds(e.value) and not e.holds(c.value)),
+        tuple(e.name for e, _ in outside),
+        tuple(e.name for e, c in outside if not e.holds(c.value)),
+        bool(outside) and standard_errors(found, truth(log)) < CLEAR,
     )
 
 
