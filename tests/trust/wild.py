@@ -69,6 +69,7 @@ class Outcome:
     outside: tuple[str, ...] = ()
     beyond: tuple[str, ...] = ()
     hidden: bool = False
+    by_chance: float = 0.0
 
     @property
     def is_refused(self) -> bool:
@@ -154,6 +155,15 @@ def truth(name: str) -> Identification:
     return found
 
 
+def left_outside(wider: float) -> float:
+    """How often a right value lies outside an interval when its own is some times as wide, and holds that of the other.
+
+    Two normal errors, the smaller of which is a part of the larger: what comes on top has the variance
+    ``wider^2 - 1``, in that of the smaller, of which 1.96 standard deviations are the interval.
+    """
+    return float(2.0 * norm.sf(norm.ppf(0.975) / math.sqrt(wider**2 - 1.0)))
+
+
 def judge_fault(asked: tuple[str, int]) -> Outcome:
     """Identify a log with a fault, and compare its trusted constants with those of the clean log."""
     log, number = asked
@@ -175,6 +185,8 @@ def judge_fault(asked: tuple[str, int]) -> Outcome:
         tuple(e.name for e, _ in outside),
         tuple(e.name for e, c in outside if not e.holds(c.value)),
         bool(outside) and standard_errors(found, truth(log)) < CLEAR,
+        # Constants of one log err together: at least as likely as for that whose interval has grown most.
+        max((left_outside(e.half / c.half) for e, c in both if 0.0 < c.half < e.half), default=0.0),
     )
 
 
@@ -207,15 +219,6 @@ Kinds of the last table make logs of other axes, which may exist, so that no log
 is a delay, one that lacks what is added for friction is of an axis with less, one that is what a mass would need of an
 axis with none. So is, where friction is nearly all of the effort, another gain of it one way.
 """
-
-
-def left_outside(wider: float) -> float:
-    """How often a right value lies outside an interval when its own is some times as wide, and holds that of the other.
-
-    Two normal errors, the smaller of which is a part of the larger: what comes on top has the variance
-    ``wider^2 - 1``, in that of the smaller, of which 1.96 standard deviations are the interval.
-    """
-    return float(2.0 * norm.sf(norm.ppf(0.975) / math.sqrt(wider**2 - 1.0)))
 
 
 def page(outcomes: Sequence[Outcome]) -> str:
