@@ -1,9 +1,10 @@
-"""The dirt that an identification must name or refuse, in sizes drawn by lot for each log: no rule was chosen with them.
+"""The dirt that an identification must name or refuse, in sizes drawn by lot for each log; no rule was chosen with it.
 
 The kinds are those of `faults`, from a half to twice of what they are there, and smaller where that is harder to see.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -53,7 +54,7 @@ def drawn(make: Callable[[Lots], Spoil]) -> Spoil:
     return lambda table, rng: make(Lots(rng))(table, rng)
 
 
-DRAWN = (
+_KINDS = (
     Fault("spikes of the position", drawn(lambda lot: spikes("position", lot.count(1, 50), lot.size(1e-3, 0.1)))),
     Fault("spikes of the effort", drawn(lambda lot: spikes("effort", lot.count(1, 50), lot.size(2.0, 40.0)))),
     Fault("steps of the position", drawn(lambda lot: steps("position", lot.size(2e-3, 0.06), lot.count(1, 10)))),
@@ -98,4 +99,6 @@ DRAWN = (
     Fault("effort clipped", drawn(lambda lot: clipped("effort", lot.size(0.3, 0.8)))),
     Fault("effort updated in every few rows", drawn(lambda lot: held("effort", lot.count(3, 30)))),
 )
-"""Kinds by lot; the names say what is drawn of each."""
+
+DRAWN = tuple(replace(fault, name=f"{fault.name} (by lot)") for fault in _KINDS)
+"""Kinds by lot, of names of their own."""

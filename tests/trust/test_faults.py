@@ -6,8 +6,20 @@
 import numpy as np
 import pytest
 
+from tests.trust.drawn import DRAWN
+from tests.trust.hidden import CLEAR, standard_errors
 from tests.trust.unseen import UNSEEN
-from tests.trust.wild import CHOSEN, KINDS, Outcome, clean, judge_faults, left_outside, page
+from tests.trust.wild import (
+    CHOSEN,
+    KINDS,
+    Outcome,
+    clean,
+    found_in,
+    judge_faults,
+    left_outside,
+    page,
+    truth,
+)
 
 LOGS = ("simulated 7005",)
 FEW = tuple(range(0, len(KINDS), 8))
@@ -34,15 +46,46 @@ def test_few_spoilt_logs_are_accepted_and_wrong():
     assert any(not o.is_refused for o in found)
 
 
+@pytest.mark.long
+def test_usual_dirt_in_sizes_by_lot_is_refused_or_right():
+    """Two of a hundred logs wrong, and five with a value outside the interval of the clean log, at most."""
+    found = judge_faults([number for number, fault in enumerate(KINDS) if fault in DRAWN])
+    assert len(found) > 100
+    assert sum(bool(o.disjoint) for o in found) <= 0.02 * len(found), [o for o in found if o.disjoint]
+    assert sum(bool(o.outside) for o in found) <= 0.05 * len(found), [o for o in found if o.outside]
+
+
 def test_the_page_counts_each_log_once():
+    a, b = "simulated 7001", "simulated 7101"
+    wrong = {"disjoint": ("mass",), "outside": ("mass",), "beyond": ("mass",), "hidden": True, "by_chance": 0.3}
     outcomes = [
-        Outcome("a", CHOSEN[0].name, "trusted", disjoint=("mass",), outside=("mass",), beyond=("mass",)),
-        Outcome("b", CHOSEN[0].name, "refused"),
-        Outcome("a", UNSEEN[0].name, "partly trusted"),
+        Outcome(a, CHOSEN[0].name, "trusted", **wrong),
+        Outcome(b, CHOSEN[0].name, "refused"),
+        Outcome(b, UNSEEN[0].name, "partly trusted"),
     ]
     text = page(outcomes)
-    assert f"| {CHOSEN[0].name} | 2 | 0 | 1 | 1 | 1 | 1 |" in text
-    assert f"| {UNSEEN[0].name} | 1 | 1 | 0 | 0 | 0 | 0 |" in text
+    assert f"| {CHOSEN[0].name} | 2 | 0 | 1 | 1 | 1 | 0.3 | 1 | 1 |" in text
+    assert f"| {UNSEEN[0].name} | 1 | 1 | 0 | 0 | 0 | 0.0 | 0 | 0 |" in text
+    assert "| of logs chosen with | 1 | 0.0 % | 100.0 % | 0.0 % | 100.0 % | 30.0 % | 100.0 % | 100.0 % |" in text
+    assert "| of other logs | 1 | 0.0 % | 0.0 % | 100.0 % | 0.0 % | 0.0 % | 0.0 % | 0.0 % |" in text
+
+
+@pytest.mark.parametrize(("gain", "hidden"), [(1.0002, True), (1.5, False)])
+def test_a_fault_is_hidden_where_the_best_test_for_it_does_not_see_it(gain, hidden):
+    """Another gain of the effort one way: a little of it is less than the noise."""
+    made = clean(LOGS[0])
+    effort = made.table["effort"]
+    spoilt = found_in(made, made.table | {"effort": np.where(effort > 0.0, gain * effort, effort)})
+    assert not isinstance(spoilt, str)
+    assert (standard_errors(spoilt, truth(LOGS[0])) < CLEAR) == hidden
+
+
+def test_the_constants_of_another_axis_explain_an_effort_of_another_gain():
+    """All constants are larger by it; of a third more the log shows nothing."""
+    made = clean(LOGS[0])
+    spoilt = found_in(made, made.table | {"effort": 1.3 * made.table["effort"]})
+    assert not isinstance(spoilt, str)
+    assert standard_errors(spoilt, truth(LOGS[0])) < CLEAR
 
 
 @pytest.mark.parametrize("wider", [1.5, 3.0, 10.0])

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,6 +19,7 @@ from detent.errors import InputError
 from detent.identify.fit.identification import Identification, identify
 from detent.logs.read_log import read_log
 from tests.places import DATA
+from tests.trust.drawn import DRAWN
 from tests.trust.faults import FAULTS, Table
 from tests.trust.harder_faults import HARDER
 from tests.trust.hidden import CLEAR, standard_errors
@@ -29,11 +30,8 @@ from tests.trust.table import table
 from tests.trust.unseen import UNSEEN
 
 CHOSEN = (*FAULTS, *MORE, *HARDER, *LATEST)
-KINDS = (*CHOSEN, *UNSEEN)
+KINDS = (*CHOSEN, *DRAWN, *UNSEEN)
 """Every kind, by its number."""
-
-SIMULATED = (7001, 7002, 7003, 7005)
-"""Numbers of cases that faults are put into."""
 
 SERVO = ("time=timestamp", "position=position [rad]", "reference=goal_position [rad]", "velocity=", "command=load")
 
@@ -95,27 +93,40 @@ def recorded(path: str, columns: Sequence[str]) -> Clean:
     return Clean(table, {k: v.removesuffix(" []") for k, v in headings.items()})
 
 
-def _sources() -> dict[str, Callable[[], Clean]]:
-    def simulate(number: int) -> Callable[[], Clean]:
-        return lambda: simulated(number)
-
-    def record(path: str, columns: Sequence[str]) -> Callable[[], Clean]:
-        return lambda: recorded(path, columns)
-
-    found = {f"simulated {number}": simulate(number) for number in SIMULATED}
+def _sources(
+    numbers: Sequence[int], recordings: dict[str, tuple[str, Sequence[str]]]
+) -> dict[str, Callable[[], Clean]]:
+    found: dict[str, Callable[[], Clean]] = {f"simulated {number}": partial(simulated, number) for number in numbers}
     if DATA.exists():
-        screw = ("position=qm [m]", "reference=qg [m]", "force=vir [35.15 N]")
-        motor = ("command=-inputSignal",)
-        servos = "servo_pendulum_bam/xl330/2026-01-15_10h"
-        found |= {
-            "ball screw": record("emps/DATA_EMPS.mat", screw),
-            "small motor": record("arduino_dc_motor/exp1.csv", motor),
-            "servo 2": record(f"{servos}29m04.json.gz", SERVO[1:4]),
-        }
+        found |= {name: partial(recorded, *where) for name, where in recordings.items()}
     return found
 
 
-SOURCES = _sources()
+_SCREW = ("position=qm [m]", "reference=qg [m]", "force=vir [35.15 N]")
+_MOTOR = ("command=-inputSignal",)
+_MOTORS, _SERVOS = "arduino_dc_motor/expdata_20201120_21", "servo_pendulum_bam/xl330/2026-01-15_10h"
+
+TRIED = _sources(
+    (7001, 7002, 7003, 7005),
+    {
+        "ball screw": ("emps/DATA_EMPS.mat", _SCREW),
+        "small motor": ("arduino_dc_motor/exp1.csv", _MOTOR),
+        "servo 2": (f"{_SERVOS}29m04.json.gz", SERVO[1:4]),
+    },
+)
+"""Logs that rules were chosen with."""
+
+OTHERS = _sources(
+    (7101, 7102, 7103, 7104),
+    {
+        "motor 2": (f"{_MOTORS}4756.csv", _MOTOR),
+        "motor 3": (f"{_MOTORS}5727.csv", _MOTOR),
+        "servo 1": (f"{_SERVOS}28m10.json.gz", SERVO[1:4]),
+    },
+)
+"""Logs that they were not chosen with."""
+
+SOURCES = TRIED | OTHERS
 
 
 @cache
@@ -207,13 +218,19 @@ HEAD = """# Faults of recordings: what is made of each kind
 
 This page is written by `python -m tests.trust.wild`, run from the root of the project; do not edit it.
 
-{kinds} kinds of faults ([tests/trust/faults.py](../../tests/trust/faults.py)) are put into {logs}. Each spoilt log goes
-the way of a user's log, and what is trusted of it is compared with what the clean log gives. *Right*: something was
-trusted, and every trusted interval meets that of the clean log. *Wrong*: one of them does not. *Outside*: a trusted
-value lies outside the clean interval. A fault that takes away some of what the log says, as noise does, makes the
-interval wider, and leaves the value outside the clean one by chance: {chance:.0%} of the time where it is three times
-as wide. *Beyond*: and its own interval does not hold the value of the clean log either. Rules were chosen with the
-kinds of the first table at hand, and not with those of the second.
+{kinds} kinds of faults ([tests/trust/faults.py](../../tests/trust/faults.py) and its neighbours) are put into {logs}.
+Each spoilt log goes the way of a user's log, and what is trusted of it is compared with what the clean log gives.
+
+- *Right*: something was trusted, and every trusted interval meets that of the clean log. *Wrong*: one does not.
+- *Outside*: a trusted value lies outside the interval of the clean log. A fault that takes away some of what the log
+  says, as noise does, makes the interval wider, and leaves a right value outside the clean one: {often:.0%} of the time
+  where it is three times as wide. *By chance*: how many are outside so by the widths of their intervals alone.
+- *Beyond*: a value is outside, and its own interval does not hold that of the clean log either.
+- *Hidden*: a value is outside, and the log does not show the fault: what the constants of another axis leave of it is
+  less than {clear:.1f} standard errors of the best test, that knows its form exactly, and the noise of the clean log.
+
+Rules were chosen with the kinds of the second table, and with {tried}. They were not chosen with the sizes of the
+first, nor with the kinds of the third, nor with {others}.
 
 Kinds of the last table make logs of other axes, which may exist, so that no log shows them: an effort that stands early
 is a delay, one that lacks what is added for friction is of an axis with less, one that is what a mass would need of an
@@ -223,12 +240,16 @@ axis with none. So is, where friction is nearly all of the effort, another gain 
 
 def page(outcomes: Sequence[Outcome]) -> str:
     """The page of the documentation."""
-    logs = list(dict.fromkeys(o.log for o in outcomes))
-    kinds = len({o.fault for o in outcomes})
-    text = HEAD.format(kinds=kinds, chance=left_outside(3.0), logs=f"{', '.join(logs[:-1])} and {logs[-1]}")
+    logs, tried, others = (
+        f"{', '.join(names[:-1])} and {names[-1]}"
+        for names in ([n for n in part if n in {o.log for o in outcomes}] for part in (SOURCES, TRIED, OTHERS))
+    )
+    kinds, often = len({o.fault for o in outcomes}), left_outside(3.0)
+    text = HEAD.format(kinds=kinds, often=often, clear=CLEAR, logs=logs, tried=tried, others=others)
     parts = {
+        "The dirt of logs, in sizes drawn by lot": DRAWN,
         "Kinds that rules were chosen with": [fault for fault in CHOSEN if not fault.is_another],
-        "Kinds that they were not chosen with": UNSEEN,
+        "Kinds that nobody had planned for": UNSEEN,
         "What is the log of another axis": [fault for fault in CHOSEN if fault.is_another],
     }
     for title, part in parts.items():
@@ -238,20 +259,23 @@ def page(outcomes: Sequence[Outcome]) -> str:
 
 
 def fault_table(outcomes: Sequence[Outcome]) -> str:
-    """A row per kind, and one for all."""
+    """A row per kind, and one for all; their shares, and those of logs that rules were chosen with, and of others."""
     rows = [
         [name, *_counts([o for o in outcomes if o.fault == name])] for name in dict.fromkeys(o.fault for o in outcomes)
     ]
-    return table(
-        ("fault", "logs", "right", "wrong", "refused", "outside", "beyond"),
-        [*rows, ["all", *_counts(outcomes)], ["share", "", *_shares(outcomes)]],
-    )
+    shares = [
+        [name, *_shares([o for o in outcomes if o.log in part])]
+        for name, part in {"share": SOURCES, "of logs chosen with": TRIED, "of other logs": OTHERS}.items()
+    ]
+    heads = ("fault", "logs", "right", "wrong", "refused", "outside", "by chance", "beyond", "hidden")
+    return table(heads, [*rows, ["all", *_counts(outcomes)], *shares])
 
 
-def _numbers(outcomes: Sequence[Outcome]) -> tuple[int, ...]:
+def _numbers(outcomes: Sequence[Outcome]) -> tuple[float, ...]:
     wrong, refused = sum(bool(o.disjoint) for o in outcomes), sum(o.is_refused for o in outcomes)
     outside, beyond = sum(bool(o.outside) for o in outcomes), sum(bool(o.beyond) for o in outcomes)
-    return len(outcomes) - wrong - refused, wrong, refused, outside, beyond
+    chance, hidden = round(sum(o.by_chance for o in outcomes), 1), sum(o.hidden for o in outcomes)
+    return len(outcomes) - wrong - refused, wrong, refused, outside, chance, beyond, hidden
 
 
 def _counts(outcomes: Sequence[Outcome]) -> list[str]:
@@ -259,7 +283,7 @@ def _counts(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def _shares(outcomes: Sequence[Outcome]) -> list[str]:
-    return [f"{100 * number / max(len(outcomes), 1):.1f} %" for number in _numbers(outcomes)]
+    return [str(len(outcomes)), *(f"{100 * number / max(len(outcomes), 1):.1f} %" for number in _numbers(outcomes))]
 
 
 PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "fault-table.md"
