@@ -6,6 +6,7 @@
 import numpy as np
 import pytest
 
+from tests.places import DATA
 from tests.trust.drawn import DRAWN
 from tests.trust.hidden import CLEAR, standard_errors
 from tests.trust.unseen import UNSEEN
@@ -47,6 +48,7 @@ def test_few_spoilt_logs_are_accepted_and_wrong():
 
 
 @pytest.mark.long
+@pytest.mark.skipif(not DATA.exists(), reason="the recordings are not at hand")
 def test_usual_dirt_in_sizes_by_lot_is_refused_or_right():
     """Two of a hundred logs wrong, and five with a value outside the interval of the clean log, at most."""
     found = judge_faults([number for number, fault in enumerate(KINDS) if fault in DRAWN])
