@@ -1,13 +1,12 @@
-"""Recordings as text tables: comma-separated values in all their dialects, and what cells say."""
+"""Recordings as text tables: comma-separated values in all their dialects, read a block of rows at a time."""
 
 import csv
 import re
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import lines_of, read_bytes, short
+from detent.logs.cells import MISSING, is_moment, is_number, read_cell, read_column, read_moments
 from detent.logs.headings import is_unit, split_heading
 from detent.logs.log import tell_count
 from detent.logs.mapping import SEPARATORS, FileOptions
@@ -23,19 +23,13 @@ from detent.logs.raw_table import LARGEST_EXACT, BrokenRow, Item, RawTable, chec
 
 MAX_BYTES = 200_000_000  # longest text table read, unpacked: two hours of ten signals, 200 times a second, are 150 MB
 ALLOWED = "a table as text: CSV, packed with gzip or not"
+STRETCH = 1 << 20  # characters whose lines are in memory at once
 BLOCK_ROWS = 16384  # rows whose cells are in memory as text at once
 _MOST_BROKEN = 0.2
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 SAMPLE_LINES = 200  # lines that say something from which the layout is guessed
 _TRIED = ("\t", ";", ",", "|", " ")
 _COMMENT = re.compile(r"\s*(#|%|//|\*)\s?")
-# Texts, in small letters, with which programs say that there is no value.
-MISSING = frozenset({"", "-", "--", "?", "na", "n/a", "nan", "-nan", "null", "none", "nil", "inf", "-inf", "+inf"})
-_WORDS = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0}
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eEdD][+-]?[0-9]{1,3})?")
-_MOMENT = re.compile(
-    r"([0-9]{4}-[0-9]{2}-[0-9]{2})[T ]([0-9]{2}:[0-9]{2}:[0-9]{2}(?:[.,][0-9]{1,9})?)(?:Z|[+-][0-9:]{4,6})?"
-)
 
 
 @dataclass(slots=True)
@@ -58,25 +52,22 @@ def read_csv(path: Path, options: FileOptions) -> RawTable:
     """Read a text table; rows that do not fit the header or their columns of numbers are put aside as broken."""
     table = RawTable(str(path))
     text = decode(path, read_bytes(path, MAX_BYTES, ALLOWED), table)
-    lines = lines_of(text if "\n" in text else text.replace("\r", "\n"))  # old programs end a line in CR alone
+    text = text if "\n" in text else text.replace("\r", "\n")  # old programs end a line in CR alone
     is_quoted = '"' in text
-    del text  # as large as the file
     try:
-        lines = _unquoted(table, lines)
-        layout = guess_layout(table, lines, options)
-        numbers = array("q", (index for index in range(layout.first, len(lines)) if is_telling(lines[index])))
-        check_size(table.file, len(numbers), len(layout.names))
-        _read_rows(table, layout, _blocks(layout, lines, numbers, is_quoted=is_quoted))
+        text = _unquoted(table, text)
+        layout = guess_layout(table, _head(text, options.header or 0), options)
+        most = _most_rows(table, layout, text)
+        columns = _read_rows(table, layout, _blocks(layout, text, is_quoted=is_quoted), most)
     except csv.Error as error:
         got = f"ambiguous cells ({error})"
         raise InputError.of_file(table.file, got, ALLOWED, "remove the quotation marks, or state separator=") from None
-    if len(table.broken) > _MOST_BROKEN * len(numbers) and len(table.broken) > 2:
-        worst = table.broken[0]
-        line = numbers[worst.row - 1]
-        got = f"{short(lines[line].strip())} ({worst.reason}; {len(table.broken)} of {len(numbers)} rows are broken)"
-        allowed = f"rows of {len(layout.names)} cells as the header has"
-        remedy = "state separator=, decimal= or header= (its line)"
-        raise InputError([FileProblem(table.file, line + 1, 1, "", got, allowed, remedy)])
+    _check_broken(table, layout, text)
+    del text  # as large as the file: no longer needed where the columns are put together
+    for index in list(columns):
+        table.add(Item(layout.names[index], columns.pop(index).joined(), layout.units[index]))
+    words = [short(layout.names[index]) for index in sorted(layout.text_columns)]
+    table.notes += [f"text columns skipped: {', '.join(words)}"] if words else []
     return table
 
 
@@ -93,102 +84,164 @@ def decode(path: Path, data: bytes, table: RawTable) -> str:
         return data.decode("cp1252", "replace")
 
 
-def _unquoted(table: RawTable, lines: list[str]) -> list[str]:
-    """Lines without the one pair of quotation marks around each that a spreadsheet leaves which took rows for cells."""
-    sample = list(islice(filter(is_telling, lines), SAMPLE_LINES))
+def _lines(text: str, first: int = 0) -> Iterator[str]:
+    """Lines of a text, as of `lines_of`, from one of them on: few are in memory at once, each as large as its text."""
+    return islice(chain.from_iterable(map(lines_of, _stretches(text))), first, None)
+
+
+def _stretches(text: str) -> Iterator[str]:
+    """A text in stretches of whole lines."""
+    first = 0
+    while first < len(text):
+        last = text.find("\n", first + STRETCH) + 1 or len(text)
+        yield text[first:last]
+        first = last
+
+
+def _head(text: str, begin: int) -> list[str]:
+    """Lines of a text as far as the layout is guessed from them: `SAMPLE_LINES` that say something, from one on."""
+    head: list[str] = []
+    left = SAMPLE_LINES
+    for index, line in enumerate(_lines(text)):
+        head.append(line)
+        left -= index >= begin and is_telling(line)
+        if not left:
+            break
+    return head
+
+
+def _most_rows(table: RawTable, layout: CsvLayout, text: str) -> int:
+    """How many rows there are, at most; a table that would fill the memory is refused."""
+    most = text.count("\n") + 1
+    try:
+        check_size(table.file, most, len(layout.names))
+    except InputError:  # not every line is a row
+        most = sum(map(is_telling, _lines(text, layout.first)))
+        check_size(table.file, most, len(layout.names))
+    return most
+
+
+def _check_broken(table: RawTable, layout: CsvLayout, text: str) -> None:
+    """Refuse a table of which too many rows are broken: the layout is another."""
+    if len(table.broken) <= 2:
+        return
+    rows = array("q", (k for k, line in enumerate(_lines(text, layout.first), layout.first) if is_telling(line)))
+    if len(table.broken) <= _MOST_BROKEN * len(rows):
+        return
+    worst = table.broken[0]
+    place = rows[worst.row - 1]
+    line = next(_lines(text, place)).strip()
+    got = f"{short(line)} ({worst.reason}; {len(table.broken)} of {len(rows)} rows are broken)"
+    allowed = f"rows of {len(layout.names)} cells as the header has"
+    remedy = "state separator=, decimal= or header= (its line)"
+    raise InputError([FileProblem(table.file, place + 1, 1, "", got, allowed, remedy)])
+
+
+def _unquoted(table: RawTable, text: str) -> str:
+    """Text without the quotation marks around each line that a spreadsheet leaves which took rows for cells."""
+    sample = list(islice(filter(is_telling, _lines(text)), SAMPLE_LINES))
     if not sample or not all(line[0] == line.rstrip()[-1] == '"' for line in sample):
-        return lines
+        return text
     if any(len(cells) != 1 for separator in "\t;,|" for cells in csv.reader(sample, delimiter=separator)):
-        return lines
-    inside = list(csv.reader(lines))
-    if not any(separator in cells[0] for cells in inside for separator in "\t;,|" if cells):
-        return lines
+        return text
+    if not any(separator in cells[0] for cells in csv.reader(_lines(text)) for separator in "\t;,|" if cells):
+        return text
     table.notes.append("quotation marks around whole lines left out")
-    return ["".join(cells) for cells in inside]
+    return "\n".join("".join(cells) for cells in csv.reader(_lines(text)))
 
 
 Block = list[list[str]] | NDArray[np.float64]  # rows of cells; or of numbers, where all cells are
 
 
-def _blocks(layout: CsvLayout, lines: list[str], numbers: Sequence[int], *, is_quoted: bool) -> Iterator[Block]:
+def _blocks(layout: CsvLayout, text: str, *, is_quoted: bool) -> Iterator[Block]:
     """The rows, a block at a time; what is quoted may go on in the next line."""
+    lines = filter(is_telling, _lines(text, layout.first))
     if is_quoted:
-        cells = split_lines((lines[index] for index in numbers), layout.separator)
+        cells = split_lines(lines, layout.separator)
         while block := list(islice(cells, BLOCK_ROWS)):
             yield block
         return
-    for first in range(0, len(numbers), BLOCK_ROWS):
-        places = numbers[first : first + BLOCK_ROWS]
-        told = [lines[index] for index in places]
+    while told := list(islice(lines, BLOCK_ROWS)):
         found = _all_numbers(layout, told)
-        if found is None:
-            yield list(split_lines(told, layout.separator))
-            continue
-        for index in places:  # none of them is broken, so nobody asks for its text any more
-            lines[index] = ""
-        yield found
+        yield list(split_lines(told, layout.separator)) if found is None else found
 
 
 def _all_numbers(layout: CsvLayout, lines: list[str]) -> NDArray[np.float64] | None:
     """Numbers of lines that hold nothing else, as `read_column` would read them; None where one does."""
-    separator, width = layout.separator, len(layout.names)
-    if separator == " " or layout.decimal != "." or layout.text_columns or layout.moment_columns:
+    if layout.separator == " " or layout.decimal != "." or layout.text_columns or layout.moment_columns:
         return None
-    if any(line.count(separator) != width - 1 for line in lines):
-        return None
+    if "\r" in "".join(lines):  # it ends no line here, and may stand beside a number as a blank may
+        lines = [line.replace("\r", " ") for line in lines]
     try:
-        found = np.array(separator.join(lines).split(separator), np.float64).reshape(len(lines), width)
-    except ValueError:
+        found = np.loadtxt(lines, np.float64, comments=None, delimiter=layout.separator, ndmin=2)
+    except ValueError:  # a cell that is no number, or lines of different width
         return None
-    return None if np.any(np.all(np.abs(found) > LARGEST_EXACT, axis=0)) else found
+    is_exact = not np.any(np.all(np.abs(found) > LARGEST_EXACT, axis=0))
+    return found if is_exact and found.shape == (len(lines), len(layout.names)) else None
 
 
-def _read_rows(table: RawTable, layout: CsvLayout, blocks: Iterable[Block]) -> None:
-    """Read all rows into the columns and the broken rows."""
-    columns = [index for index in range(len(layout.names)) if index not in layout.text_columns]
-    pieces: dict[int, list[NDArray[np.generic]]] = {index: [] for index in columns}
-    rows: list[NDArray[np.int64]] = []
+class _Column:
+    """A column put together of pieces, in memory asked for at once: many small arrays would leave holes behind."""
+
+    def __init__(self, most: int) -> None:
+        self._most, self._count = most, 0  # numbers that may come, whose memory is not taken before; those that came
+        self._values: NDArray[np.generic] = np.empty(0)
+
+    def append(self, piece: NDArray[np.generic]) -> None:
+        """Put a piece behind those before; whole numbers become floats where others are."""
+        if not self._count:
+            self._values = np.empty(self._most, piece.dtype)
+        self._values = self._values.astype(np.result_type(self._values, piece), copy=False)
+        first, self._count = self._count, self._count + len(piece)
+        self._values[first : self._count] = piece
+
+    def joined(self) -> NDArray[np.generic]:
+        """All pieces."""
+        return self._values[: self._count]
+
+
+def _read_rows(table: RawTable, layout: CsvLayout, blocks: Iterable[Block], most: int) -> dict[int, _Column]:
+    """Read all rows, at most so many, into the columns of numbers, those of words, and the broken rows."""
+    columns = {index: _Column(most) for index in range(len(layout.names)) if index not in layout.text_columns}
+    rows = _Column(most)
     texts: dict[int, list[Change]] = {index: [] for index in sorted(layout.text_columns)}
     first = 1
     for block in blocks:
         if isinstance(block, np.ndarray):
-            for index in columns:
-                pieces[index].append(block[:, index].copy())
+            for index, column in columns.items():
+                column.append(block[:, index])
             rows.append(np.arange(first, first + len(block)))
         else:
-            fitting, keep, across = _read_cells(table, layout, block, first, pieces)
+            fitting, keep, across = _read_cells(table, layout, block, first, columns)
             for index, said in texts.items():
                 said.extend(changes_of(across[index], [row + first for row in fitting], said[-1][1] if said else None))
             rows.append(np.array(fitting, dtype=np.int64)[keep] + first)
         first += len(block)
-    table.rows = np.concatenate(rows) if rows else table.rows
-    for index in columns:
-        table.add(Item(layout.names[index], np.concatenate(pieces.pop(index)), layout.units[index]))
+    table.rows = rows.joined().astype(np.int64, copy=False)
     table.broken.sort()
     table.words = {layout.names[index]: said for index, said in texts.items() if len(said) <= MOST_TESTS}
-    words = [short(layout.names[index]) for index in sorted(layout.text_columns)]
-    table.notes += [f"text columns skipped: {', '.join(words)}"] if words else []
+    return columns
 
 
 def _read_cells(
-    table: RawTable, layout: CsvLayout, block: list[list[str]], first: int, pieces: dict[int, list[NDArray[np.generic]]]
+    table: RawTable, layout: CsvLayout, block: list[list[str]], first: int, columns: dict[int, _Column]
 ) -> tuple[list[int], NDArray[np.bool_], list[tuple[str, ...]]]:
-    """Read rows of cells into pieces of the columns; rows as wide as the header, which of them hold numbers, cells."""
+    """Read rows of cells into the columns; rows as wide as the header, which of them hold numbers, cells."""
     fitting = _sort_out(table, layout, block, first)
     found: dict[int, NDArray[np.generic]] = {}
     wrong: dict[int, str] = {}  # of each row that holds no number where it should, the first such cell
     across = list(zip(*(block[row] for row in fitting), strict=True)) or [()] * len(layout.names)
-    for index in pieces:
-        column = across[index]
+    for index in columns:
+        cells = across[index]
         dated = index in layout.moment_columns
-        values, bad = read_moments(column) if dated else read_column(column, layout.decimal)
+        values, bad = read_moments(cells) if dated else read_column(cells, layout.decimal)
         found[index] = values
-        wrong = {fitting[place]: column[place] for place in bad} | wrong
+        wrong = {fitting[place]: cells[place] for place in bad} | wrong
     for row, cell in wrong.items():
         _break(table, layout, block[row], first + row, f'"{short(cell)}" is no number')
     keep = np.array([row not in wrong for row in fitting], dtype=np.bool_)
     for index, values in found.items():
-        pieces[index].append(values[keep])
+        columns[index].append(values[keep])
     return fitting, keep, across
 
 
@@ -212,58 +265,6 @@ def _break(table: RawTable, layout: CsvLayout, cells: list[str], row: int, reaso
     """Put a row aside."""
     telling = tuple(read_cell(cell, layout.decimal) for cell in cells if cell)
     table.broken.append(BrokenRow(row, telling, reason))
-
-
-def is_number(cell: str) -> bool:
-    """True for a cell that is a number, with a decimal point or comma, or a truth value."""
-    return _NUMBER.fullmatch(cell) is not None or cell.lower() in _WORDS
-
-
-def is_moment(cell: str) -> bool:
-    """True for a cell that is a date with a time of day, such as ``2024-10-26T12:23:27.5``."""
-    return _MOMENT.fullmatch(cell) is not None
-
-
-def read_cell(cell: str, decimal: str) -> float | None:
-    """Number of one cell: NaN where it says nothing, None where it is no number.
-
-    >>> read_cell("1,5", ","), read_cell("n/a", ","), read_cell("1.2.3", ",")
-    (1.5, nan, None)
-    """
-    if cell.lower() in MISSING:
-        return np.nan
-    if cell.lower() in _WORDS:
-        return _WORDS[cell.lower()]
-    if not _NUMBER.fullmatch(cell) or ("," in cell and decimal != ","):
-        return None
-    # Fortran writes double precision with a D.
-    return float(cell.replace(",", ".").replace("D", "e").replace("d", "e"))
-
-
-def read_column(cells: Sequence[str], decimal: str) -> tuple[NDArray[np.float64] | NDArray[np.int64], set[int]]:
-    """Numbers of a piece of a column, and the indices of the cells that are no numbers (NaN there)."""
-    # Whole numbers beyond what a float holds exactly stay whole numbers.
-    try:
-        values = np.array(cells, dtype=np.float64)
-    except ValueError:
-        found = [read_cell(cell, decimal) for cell in cells]
-        wrong = {index for index, value in enumerate(found) if value is None}
-        values = np.array([np.nan if value is None else value for value in found])
-        return values, wrong
-    if len(values) and np.all(np.abs(values) > LARGEST_EXACT):
-        with suppress(ValueError, OverflowError):
-            return np.array([int(cell) for cell in cells], dtype=np.int64), set()
-    return values, set()
-
-
-def read_moments(cells: Sequence[str]) -> tuple[NDArray[np.datetime64], set[int]]:
-    """Moments of a piece of a column of dates, their difference to UTC left out, and the indices of what is none."""
-    found = [_MOMENT.fullmatch(cell) for cell in cells]
-    texts = [f"{match[1]}T{match[2].replace(',', '.')}" if match else "NaT" for match in found]
-    try:
-        return np.array(texts, dtype="datetime64[ns]"), {index for index, match in enumerate(found) if match is None}
-    except ValueError:  # a month 13, or a year beyond what nanoseconds can count
-        return np.full(len(cells), np.datetime64("NaT"), dtype="datetime64[ns]"), set(range(len(cells)))
 
 
 def is_telling(line: str) -> bool:
@@ -362,8 +363,6 @@ def _read_header(table: RawTable, lines: Sequence[str], layout: CsvLayout, state
     width = layout.width
     above = [index for index in range(layout.first) if lines[index].strip()]
     if stated is not None:
-        if stated > len(lines):
-            raise InputError.of_file(table.file, f"header={stated}", f"a line from 1 to {len(lines)}", "state its line")
         above = [stated - 1] if stated else []
     rows = [_cells(lines[index], layout.separator) for index in above]
     units: list[str] = []

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import decode_utf8, kind_of, lines_of, read_bytes, short
+from detent.logs.cells import is_moment, read_cell, read_moments
 from detent.logs.headings import split_heading
 from detent.logs.mapping import FileOptions
 from detent.logs.raw_table import BrokenRow, Item, RawTable, check_size, flatten, no_table, table_of, tell
-from detent.logs.read_csv import is_moment, read_cell, read_moments
 
 MAX_BYTES = 100_000_000  # longest file of JSON read, unpacked; its values take ten times the memory
 ALLOWED = "JSON: a list of records, lists by their names, or one record per line"

@@ -2,6 +2,7 @@
 
 import gzip
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -148,6 +149,8 @@ def test_nanoseconds_since_1970_stay_exact(write):
     table = read_csv(write(f"t_ns,x\n{start},1\n{start + 1},2\n{start + 1001},3\n"), FileOptions())
     assert table.columns["t_ns"].tolist() == [0, 1, 1001]
     assert table.notes == [f"t_ns: counted from its first value, {start}"]
+    table = read_csv(write(f"t_ns,x,state\n{start},1,run\n{start + 1},2,run\n{start + 1001},3,run\n"), FileOptions())
+    assert table.notes == [f"t_ns: counted from its first value, {start}", "text columns skipped: state"]
 
 
 def test_more_cells_than_headings(write):
@@ -175,6 +178,49 @@ def test_blocks_join(write, monkeypatch):
     assert table.rows.tolist() == [k + 1 for k in range(50) if k != 20]
     assert table.columns["x"].tolist() == [k * 0.5 for k in range(50) if k != 20]
     assert [row.row for row in table.broken] == [21]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("mark", ["", '"'])
+@pytest.mark.parametrize("stretch", [0, 3, 40])
+def test_a_text_may_be_cut_behind_any_line(write, monkeypatch, end, mark, stretch):
+    lines = [
+        "# by a logger",
+        "t [s],x [mm]",
+        *(f"{k},{k * 0.5}" for k in range(9)),
+        "",
+        "# a remark",
+        "9,4.5",
+        "word,5",
+    ]
+    path = write(end.join(f"{mark}{line}{mark}" for line in lines))
+    broken = write(end.join(f"{mark}{line}{mark}" for line in [*lines, *["1,2,3"] * 3]), "broken.csv")
+    whole, problem = read_csv(path, FileOptions()), refusal(broken)
+    monkeypatch.setattr("detent.logs.read_csv.STRETCH", stretch)
+    monkeypatch.setattr("detent.logs.read_csv.BLOCK_ROWS", 4)
+    table = read_csv(path, FileOptions())
+    assert columns(table) == columns(whole)
+    assert columns(table)["x [mm]"] == [k * 0.5 for k in range(10)]
+    assert (table.rows.tolist(), table.broken, table.notes) == (whole.rows.tolist(), whole.broken, whole.notes)
+    assert refusal(broken) == problem
+    assert (problem.line, problem.got[:5]) == (15, "word,")
+
+
+def test_what_a_table_takes_in_memory_is_its_text_and_its_numbers(write, monkeypatch):
+    monkeypatch.setattr("detent.logs.read_csv.STRETCH", 10_000)
+    monkeypatch.setattr("detent.logs.read_csv.BLOCK_ROWS", 100)
+    text = "t [s],x [mm],i [A]\n" + "".join(f"{k * 1e-3:.6f},{k % 7:.6f},{k % 3:.6f}\n" for k in range(20_000))
+    monkeypatch.setattr("detent.logs.read_csv.MAX_BYTES", len(text))  # so many are asked for before they are read
+    path = write(text)
+    read_csv(path, FileOptions())
+    tracemalloc.start()
+    try:
+        table = read_csv(path, FileOptions())
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert table.columns["t [s]"][-1] == 19.999
+    assert most < 2.5 * len(text)  # all lines at once would be as much on top
 
 
 @pytest.mark.parametrize(
@@ -205,6 +251,10 @@ def test_too_large(write, monkeypatch):
     monkeypatch.setattr("detent.logs.read_csv.MAX_BYTES", 3000)
     monkeypatch.setattr("detent.logs.raw_table.MAX_CELLS", 150)
     assert refusal(path).got == "2 columns of 100 rows"
+    remarks = write("t,x\n" + "1,2\n# a remark\n\n" * 75, "remarks.csv")
+    assert len(read_csv(remarks, FileOptions()).rows) == 75
+    monkeypatch.setattr("detent.logs.raw_table.MAX_CELLS", 149)
+    assert refusal(remarks).got == "2 columns of 75 rows"
     packed = write(gzip.compress(b"t,x\n" + b"1,2\n" * 5000), "bomb.csv.gz")
     assert refusal(packed).got == "more than 0 MB"
 
@@ -270,6 +320,12 @@ def test_lines_of_old_programs_end_in_a_carriage_return_alone(write):
         "t [s]": [0, 1, 2],
         "x [mm]": [1, 2, 3],
     }
+
+
+def test_a_carriage_return_in_a_line_is_a_blank_beside_a_number(write):
+    lines = "".join(f"{k},{k}\n" for k in range(300))
+    table = read_csv(write(f"t,x\n{lines}300\r,\r300\n301,301\r\r\n"), FileOptions())
+    assert columns(table) == {"t": [*range(302)], "x": [*range(302)]}
 
 
 def test_lines_of_nothing_but_numbers_say_the_same_as_cells_in_quotes(write, monkeypatch):

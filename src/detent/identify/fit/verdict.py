@@ -372,13 +372,13 @@ def look_at_windows(run: Run, moved: Sequence[Moved], names: Collection[str]) ->
 def level_of(effort: Values) -> float:
     """Distance of the values that an effort goes to from the nearest other value, the root mean square over these."""
     # A value that it keeps counts once: a command that is stepped is exact, however far its steps are.
-    effort = effort[np.r_[True, np.diff(effort) != 0.0]]
-    levels, counts = np.unique(effort, return_counts=True)
+    levels, counts = np.unique(effort[np.r_[True, np.diff(effort) != 0.0]], return_counts=True)
     if len(levels) < 2:
         return 0.0
-    ways = np.diff(levels)
-    nearest = np.minimum(np.r_[np.inf, ways], np.r_[ways, np.inf])
-    return float(np.sqrt(np.sum(counts * nearest**2) / len(effort)))
+    ways = np.r_[np.inf, np.diff(levels), np.inf]
+    nearest = np.minimum(ways[:-1], ways[1:])
+    nearest *= nearest  # in its place: it is as large as the log, where the effort is never twice the same
+    return float(np.sqrt(np.sum(np.multiply(counts, nearest, out=nearest)) / np.sum(counts)))
 
 
 def look_at_prediction(
