@@ -258,7 +258,10 @@ def test_saturation(folder, seed, role, part):
     assume(ends and all((clipped == end).sum() >= 10 for end in ends))
     recording.columns[role] = clipped
     log = recording.read(folder)
-    assert rows_told(log, Kind.SATURATED) == set((np.flatnonzero(np.isin(clipped, ends)) + 1).tolist())
+    told = rows_told(log, Kind.SATURATED)
+    assert set((np.flatnonzero(np.isin(clipped, ends)) + 1).tolist()) <= told
+    # At the other end noise may take it from its limit and back, so that no three rows there follow one another.
+    assert told <= set((np.flatnonzero(np.abs(clipped) == limit) + 1).tolist())
 
 
 # -- physics --------------------------------------------------------------------------------------------------
