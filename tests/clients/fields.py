@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 import sys
 
 import aioca
@@ -25,4 +26,5 @@ for field, pv in pvs.items():
 found["extras"] = {
     extra: epics.caget(f"{name}:{extra}", as_string=True) for extra in ("trust", "state", "fault_text", "sample")
 }
-print(json.dumps(found))
+print(json.dumps(found), flush=True)
+os._exit(0)  # pyepics now and then crashes while Python shuts down (its issue 228)

@@ -2,6 +2,7 @@
 
 import faulthandler
 import json
+import os
 import sys
 import threading
 import time
@@ -110,4 +111,5 @@ elif what == "jog":
     forward.put(0, wait=True)
     rest()
     found["stopped"] = motor.position - start
-print(json.dumps(found))
+print(json.dumps(found), flush=True)
+os._exit(0)  # pyepics now and then crashes while Python shuts down (its issue 228)
