@@ -1,6 +1,7 @@
 """Faults that no rule was chosen with: written down, judged once, and then left alone.
 
-Whoever chooses rules with these at hand moves them to the others, and writes new ones.
+Which of them are accepted and wrong has been looked at since they were counted, and no rule came of it. Whoever
+chooses rules with these at hand moves them to the others, and writes new ones.
 
 Each spoils the columns of a clean log as those of `faults` do, and makes of it a log that no axis makes.
 """
