@@ -26,6 +26,8 @@ def standard_errors(spoilt: Identification, clean: Identification) -> float:
     half = max(part.motion.kernel.half for found in (spoilt, clean) for part in prepare_all(found.runs, way))
     (rows, left), (others, without) = (_residuals(found, half, way, terms, bend) for found in (spoilt, clean))
     both = np.intersect1d(rows, others)
+    if len(both) < 0.5 * len(rows):
+        return np.inf  # what the others show is not known
     # Of logs whose rows are not those of the same moments the difference is as large as the residuals: never hidden.
     column, noise = left[np.isin(rows, both)] - without[np.isin(others, both)], without[np.isin(others, both)]
     covariance, _ = coloured_covariance(column[:, None], noise)

@@ -22,6 +22,9 @@ SOURCE = str(Path(detent.__file__).parents[1])
 BY = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]
 NOTHING = "Interrupted; no file was written or changed.\n"
 
+# Whoever begins the tests in the background ignores the key that interrupts, and what they begin inherits that.
+IN_FRONT = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+
 # Interrupts the process when a module is asked for, as a person does in the first second.
 AT_IMPORT = """
 import os, sys
@@ -51,7 +54,7 @@ with {kind} as made:
 
 def python(code: str, cwd: Path) -> tuple[int, str]:
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=cwd,
+        [sys.executable, "-c", IN_FRONT + code], capture_output=True, text=True, check=False, cwd=cwd,
         env={**os.environ, "PYTHONPATH": SOURCE},
     )  # fmt: skip
     return done.returncode, done.stdout + done.stderr

@@ -85,7 +85,7 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
     theta = regression.solve(z, x, effort)
     rest, size = effort - regression.combine(x, theta), max(rms(effort), 1e-300)
     limits = {name: quantile(d) * fit.error(name) for name, d in zip(fit.names, fit.degrees.tolist(), strict=True)}
-    found: dict[str, list[tuple[tuple[bool, float], Change]]] = {}
+    found: dict[str, tuple[tuple[bool, float], Change]] = {}
     others = _Others(x, z)
     for look in _looks(parts, fit, x, z):
         amplitude, least = _amplitude(look, others, rest)
@@ -94,9 +94,9 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
         clear = abs(amplitude) / max(least, 1e-300)
         if clear > 1.0 and (abs(amplitude) > limits.get(look.name, 0.0) or share > SLIGHT):
             change = Change(look.name, look.mean, amplitude, share, look.course)
-            # A large one is not to be hidden by a slight one that is clearer.
-            found.setdefault(look.name, []).append(((change.is_large, clear), change))
-    return [max(changes, key=itemgetter(0))[1] for changes in found.values()]
+            one = (change.is_large, clear), change  # a slight one that is clearer is not to hide a large one
+            found[look.name] = max(found.get(look.name, one), one, key=itemgetter(0))
+    return [change for _, change in found.values()]
 
 
 class _Others:
