@@ -29,6 +29,7 @@ from detent.identify.fit.ladder import (
 )
 from detent.identify.fit.output_error import STRETCH, fit_output_error
 from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
+from detent.identify.fit.signals import look_at_log, scale_off
 from detent.identify.fit.steadiness import changes_of, widen
 from detent.identify.fit.verdict import (
     BETTER_MISSED,
@@ -38,7 +39,6 @@ from detent.identify.fit.verdict import (
     compare_methods,
     look_at_constants,
     look_at_fit,
-    look_at_log,
     look_at_motion,
     look_at_prediction,
     look_at_windows,
@@ -181,7 +181,7 @@ def identify(
     parts, (climbs, fit, rivals), odd = _fit_usual(parts, runs, report)
     runs = tuple(p.run for p in parts)
     windows = sum(len(p.motion.rows) for p in parts)
-    changes = changes_of(parts, fit)
+    changes = [*changes_of(parts, fit), *scale_off(runs)]
     own = replace(fit, covariance=fit.covariance.copy())
     widen(parts, fit, changes)
     constants = constants_of(fit, rivals)

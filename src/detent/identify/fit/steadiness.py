@@ -39,14 +39,15 @@ SIDE = 0.15  # share of what tells a constant that each side of a course holds, 
 UNEVEN = 0.02  # size of an uneven effort over the effort, from which on its sizes differ
 OWN = 1e-3  # part of a column that no other explains, from which on it is one of its own
 SPEED, SIGN = "with the speed", "with its sign"
-GAIN, FORCE = "gain of the effort", "zero of the effort"  # what may change beside the constants of the model
+# What may change, or be off, beside the constants of the model.
+GAIN, FORCE, SCALE = "gain of the effort", "zero of the effort", "scale of the position"
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
     """By how much a constant changes within a log."""
 
-    name: str  # term of the model, or `GAIN`, or `FORCE`
+    name: str  # term of the model, or `GAIN`, `FORCE`, `SCALE`
     mean: float  # and amplitude: its constant, and the change to each side of it
     amplitude: float
     share: float  # the amplitude over the mass or the gain, or what it does to the effort over the effort
@@ -222,6 +223,8 @@ def _over_place(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Val
     along = np.concatenate(places)
     yield "from end to end of the travel", along
     yield "from the middle to the ends of the travel", 2.0 * np.abs(along) - 1.0
+    for halves in range(3, MOST_HALVES + 1):
+        yield f"up and down over the travel, in {halves} half waves", np.cos(0.5 * np.pi * halves * (along + 1.0))
 
 
 def _level(values: Values) -> Values:
@@ -242,7 +245,7 @@ def _side(change: Change, name: str, value: float, effort: float, top: float) ->
     """By how much a change leaves a constant open to each side."""
     kind, _, way = change.name.partition(".")
     is_force = name.startswith(("coulomb", "offset"))
-    if change.name == GAIN:
+    if change.name in {GAIN, SCALE}:
         return change.amplitude * value
     if change.name == FORCE:
         return change.amplitude * effort * is_force

@@ -13,17 +13,13 @@ from detent.identify.fit.equations import Run
 from detent.identify.fit.estimate import Estimate, quantile, rms
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb, chosen_climb
-from detent.identify.fit.regression import Fit, Prepared, combine, lag_of, make_effort, residuals_of, solve
+from detent.identify.fit.regression import Fit, Prepared, make_effort, residuals_of
 from detent.identify.fit.steadiness import FORCE, GAIN, Change
 from detent.identify.fit.windows import MOST_OUT, Moved, sticks_out
-from detent.logs.differences import stepped
-from detent.logs.log import Action, Kind, Log, Severity, Values
+from detent.logs.log import Values
 
 LEAST_MOTION = 1.0  # time in which the axis really moves [s], at least
 LEAST_EACH_WAY = 0.05  # share of this time in each direction, at least
-MOST_SATURATED = 0.3  # share of saturated samples, at most
-MOST_STUCK = 0.05  # share of samples with a stuck signal, at most
-MOST_LEFT_BEHIND = 0.6  # share of the reference's way while the position stands still, at most: friction may hold it
 WIDEST_MASS = 0.2  # half of the interval of the mass over the mass, at most
 UNTOLD_FORCE = 0.1  # effort that a mass which is not known leaves open, over the effort, at most
 WIDEST_FORCE = 0.15  # half of the interval of a friction or a weight over the effort that moves the axis, at most
@@ -34,14 +30,6 @@ USUAL_DELAY = 3.0  # samples by which an effort may act later whatever that does
 MOST_LATE = 2.5  # samples by which the effort may come after the motion that it causes
 COARSE = 0.1  # distance of the levels of an effort, in its size, from which it may say too little
 UNTOLD = 0.06  # residual in this distance from which it does: a command that is one of few levels is exact
-SLOWEST = 0.1  # share of the top speed from which an axis moves
-FEWEST_BESIDE = 20  # zeros in motion, and different values beside the gap about them, from which small ones are gone
-ROUNDED = 6  # digits to which ways from row to row, over the largest, are one and the same: straight lines were drawn
-FEWEST_UPDATES, LONGEST_HELD = 20, 0.04  # updates of a signal, and the time between two [s], by which it is held
-# Deviation of a position from its reference that a course of time explains, over the travel, and over what is left
-# beside it, from which on the position is not that of the loop; the share of the way by which a loop may stay behind
-# and still follows; and rows that are compared.
-LEAVES, BY_FAR, FOLLOWS, FEWEST_COMPARED, MOST_COMPARED = 0.004, 1.2, 0.1, 200, 20_000
 LASTING = 0.9  # correlation of neighbouring residuals from which the model misses something that lasts
 WORST_LASTING = 0.05  # error of the prediction from which that matters
 # Error of simulations over the travel: of half a second and more, as a rule; of any of these, and of the free run.
@@ -54,14 +42,6 @@ WORST_SIMULATION = 0.7  # simulated error over that of going on with the velocit
 _WAYS = ("positive", "negative")
 _FRICTIONS = tuple(f"{kind}.{way}" for kind in ("coulomb", "viscous", "static") for way in _WAYS)
 FORCES = (*_FRICTIONS, "pendulum", "pendulum.across")
-_DIRT: dict[Kind, tuple[str, str]] = {
-    Kind.WRONG_SIGN: ("wrong sign", "invert the signal in the mapping, as in force=-COLUMN"),
-    Kind.WRONG_UNIT: ("wrong unit", "state the unit of the column in the mapping"),
-    Kind.LOST_SIGN: ("lost sign", "record the signal with its sign"),
-    Kind.COPIED: ("copied column", "record what the encoder says"),
-    Kind.DROPPED_ROWS: ("lost rows", "record the time of each row with the row"),
-    Kind.DRIFTING_CLOCK: ("clock drifts", "record time and rows by one clock"),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,115 +73,6 @@ class Refusal:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return asdict(self)
-
-
-def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusal]:
-    """What is wrong with a log before anything is fitted; `runs` are those of all logs that are identified with it."""
-    for finding in log.findings:
-        is_clock = finding.kind is Kind.DROPPED_ROWS  # rows whose gap the time shows are only left out
-        least = (Severity.ERROR,) if is_clock else (Severity.ERROR, Severity.WARNING)
-        if finding.kind in _DIRT and finding.severity in least:
-            subject, record = _DIRT[finding.kind]
-            yield Refusal(subject, f"{log.name}: {finding.signal} {finding.text}", finding.advice or record)
-    if any(f.kind is Kind.REPEATED_STAMPS and f.action is Action.INTERPOLATED for f in log.findings):
-        text = f"{log.name}: time stamps are coarser than the rows"
-        yield Refusal("coarse time", text, "record the time of each row to a tenth of a period", ("delay",))
-    ways = np.diff(log.signals["position"])
-    lines = np.round(ways / max(float(np.abs(ways).max(initial=0.0)), 1e-300), ROUNDED)
-    told_by = {
-        "position": log.signals["position"],
-        run.effort_name: log.signals[run.effort_name],
-        "the way from row to row": lines,
-    }
-    for what, values in told_by.items():
-        if 1 < (rows := held_rows(values)) <= LONGEST_HELD / run.step:
-            text = f"{log.name}: {what} changes every {rows} rows only: how old it is in between is not known"
-            yield Refusal("coarse time", text, "record each signal as often as the rows are written", ("delay",))
-    if gone := _small_values_gone(log.signals[run.effort_name], log.signals["position"]):
-        text = f"{log.name}: {run.effort_name} is never between 0 and {gone:.3g} {run.effort_unit}, and 0 in motion"
-        yield Refusal("small values are gone", text, "record the effort without a threshold below which it counts as 0")
-    told = {"position", run.effort_name}
-    stuck = float(log.mask(Kind.STUCK, signals=told).mean())
-    if stuck > MOST_STUCK:
-        text = f"{log.name}: is at standstill in {stuck:.0%} of the rows"
-        yield Refusal("stuck signal", text, "check the sensor and its cable, and record again")
-    behind = _share_left_behind(run)
-    if behind > MOST_LEFT_BEHIND:
-        text = f"{log.name}: the reference covers {behind:.0%} of its travel while the position does not change"
-        yield Refusal("stuck signal", text, "check the encoder, its cable and the drive enable, and record again")
-    if left := _leaves_reference(run):
-        text = (
-            f"{log.name}: the position leaves its reference by {left:.1%} of its travel along the log, as no loop does"
-        )
-        record = "look for a coupling that slips, counts that are lost, a scale that changes"
-        yield Refusal("position leaves its reference", text, record)
-    saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), _share_at_ends(run, runs))
-    if saturated > MOST_SATURATED:
-        text = f"{log.name}: {run.effort_name} or position is at its limit in {saturated:.0%} of the rows"
-        yield Refusal("saturated", text, "record slower or smaller moves that stay within the limit")
-
-
-def held_rows(values: Values) -> int:
-    """In every how many rows a signal is updated; 1 where it is in each, or in no such order."""
-    between = np.diff(np.flatnonzero(np.diff(values)))
-    if len(between) < FEWEST_UPDATES:
-        return 1
-    return int(np.gcd.reduce(between))
-
-
-def _small_values_gone(effort: Values, position: Values) -> float:
-    """Smallest value of an effort whose small ones were all written as 0 while the axis moved; 0 where none were."""
-    # Of a continuous effort some values lie between 0 and any other: a gap as wide as its smallest value is, with many
-    # different ones as far again behind it, is no chance, and no step of a converter.
-    sizes, speed = np.abs(effort), np.abs(np.gradient(position))
-    least = float(np.min(sizes[sizes > 0.0], initial=np.inf))
-    zeros = np.count_nonzero((sizes == 0.0) & (speed > SLOWEST * float(np.quantile(speed, 0.98))))
-    behind = len(np.unique(sizes[(sizes >= least) & (sizes < 2.0 * least)]))
-    return least if min(zeros, behind) >= FEWEST_BESIDE else 0.0
-
-
-def _share_at_ends(run: Run, runs: Sequence[Run]) -> float:
-    """Share of the samples whose effort is at its largest or smallest value, and was not put there by a step."""
-    efforts = [one.effort for one in runs] or [run.effort]
-    top, bottom = max(float(effort.max()) for effort in efforts), min(float(effort.min()) for effort in efforts)
-    above, below = run.effort == top, run.effort == bottom
-    cut = [end & ~stepped(run.effort, end, top - bottom, is_part=len(efforts) > 1) for end in (above, below)]
-    return float(np.count_nonzero(cut[0] | cut[1])) / len(run.effort)
-
-
-def _share_left_behind(run: Run) -> float:
-    """Share of the way of the reference that it makes while the position stands still for a quarter of a second."""
-    if run.reference is None:
-        return 0.0
-    count = max(round(0.25 / run.step), 2)
-    whole = len(run.position) // count * count
-    still = np.ptp(run.position[:whole].reshape(-1, count), axis=1) == 0.0
-    way = np.abs(np.diff(run.reference[:whole].reshape(-1, count), axis=1)).sum(axis=1)
-    total = float(way.sum())
-    return float(way[still].sum()) / total if total > 0.0 else 0.0
-
-
-def _leaves_reference(run: Run) -> float:
-    """By how much a position that follows its reference leaves it along a log, over the travel; 0 where it does not."""
-    if run.reference is None:
-        return 0.0
-    lag = lag_of(run.reference, run)
-    rows = np.arange(lag, len(run.position), max((len(run.position) - lag) // MOST_COMPARED, 1))
-    asked, way = run.reference[rows - lag], float(np.ptp(run.reference))
-    if not way or len(rows) < FEWEST_COMPARED:
-        return 0.0
-    # A loop is behind by its velocity and its friction, and may reach for a share of the travel only, all along.
-    place, speed, along = asked / way, np.gradient(asked), np.linspace(-1.0, 1.0, len(rows))
-    usual = np.column_stack(
-        [np.ones(len(rows)), place, speed / max(float(np.abs(speed).max()), 1e-300), np.sign(speed)]
-    )
-    turned = np.where(along > 0.0, 1.0, -1.0)
-    more = np.column_stack([usual, along, turned, place * along, place * turned])
-    error = (run.position[rows] - asked) / way
-    follows = abs(float(solve(usual, usual, error)[1])) < FOLLOWS
-    by, rest = (float(np.std(error - combine(x, solve(x, x, error)))) for x in (usual, more))
-    left = math.sqrt(max(by**2 - rest**2, 0.0))
-    return left if follows and left > max(LEAVES, BY_FAR * rest) else 0.0
 
 
 def look_at_motion(runs: Sequence[Run], parts: Sequence[Prepared]) -> Iterator[Refusal]:
@@ -280,8 +151,9 @@ def _not_told(
 def _one_speed(run: Run, velocity: Values, names: Collection[str]) -> Iterator[Refusal]:
     """Directions in which the axis has hardly more than one speed."""
     for way, speed in (("positive", velocity[velocity > 0.0]), ("negative", -velocity[velocity < 0.0])):
+        # A model without viscous friction has it in its Coulomb friction.
         concerned = tuple(name for name in (f"coulomb.{way}", f"viscous.{way}") if name in names)
-        if len(concerned) < 2 or len(speed) < 2:
+        if not concerned or len(speed) < 2:
             continue
         low, high = (float(np.quantile(speed, share)) for share in (0.1, 0.9))
         if low > SAME_SPEED * high:
