@@ -23,13 +23,14 @@ from tests.trust.drawn import DRAWN
 from tests.trust.faults import FAULTS, Table
 from tests.trust.harder_faults import HARDER
 from tests.trust.hidden import CLEAR, standard_errors
+from tests.trust.later_faults import LATER
 from tests.trust.latest_faults import LATEST
 from tests.trust.more_faults import MORE
 from tests.trust.plants import make_case
 from tests.trust.table import table
-from tests.trust.unseen import UNSEEN
+from tests.trust.unseen import SEEN, UNSEEN
 
-CHOSEN = (*FAULTS, *MORE, *HARDER, *LATEST)
+CHOSEN = (*FAULTS, *MORE, *HARDER, *LATEST, *LATER, *SEEN)
 KINDS = (*CHOSEN, *DRAWN, *UNSEEN)
 """Every kind, by its number."""
 
