@@ -29,9 +29,12 @@ def standard_errors(spoilt: Identification, clean: Identification) -> float:
     if len(both) < 0.5 * len(rows):
         return np.inf  # what the others show is not known
     # Of logs whose rows are not those of the same moments the difference is as large as the residuals: never hidden.
-    column, noise = left[np.isin(rows, both)] - without[np.isin(others, both)], without[np.isin(others, both)]
+    # How large the noise is nobody knows: where all of the effort is larger, so is that, and nothing else is left.
+    left, noise = left[np.isin(rows, both)], without[np.isin(others, both)]
+    noise = noise * float((left * noise).sum() / max((noise * noise).sum(), 1e-300))
+    column = left - noise
     covariance, _ = coloured_covariance(column[:, None], noise)
-    return float(1.0 / np.sqrt(max(covariance[0, 0], 1e-300))) if np.any(column) else 0.0
+    return float(1.0 / np.sqrt(max(covariance[0, 0], 1e-300))) if np.abs(column).max() > 1e-9 * np.abs(left).max() else 0.0
 
 
 def _residuals(

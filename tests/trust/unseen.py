@@ -1,7 +1,8 @@
 """Faults by what logs go through on their way: sensors, wires, clocks, memory, programs, people.
 
 All were written down before any was judged, and parted by lot: with one half rules are chosen, with the other,
-`UNSEEN`, none. That half is judged once; whoever looks at which of its kinds are accepted and wrong moves it to the others.
+`UNSEEN`, none. That half is judged once; whoever looks at which of its kinds are accepted and wrong moves it to the
+others.
 
 Each spoils the columns of a clean log as those of `faults` do.
 """
@@ -284,7 +285,7 @@ def lagging_zero(table: Table, _: np.random.Generator) -> Table:
 
 CATALOGUE = (
     Fault("current of a motor whose iron saturates", mapped("effort", knee)),
-    Fault("command to an amplifier with a dead zone", dead_zone),
+    Fault("command to an amplifier with a dead zone", dead_zone, is_another=True),
     Fault("a gain of the effort that waves with the commutation, 8 %", commutation),
     Fault("a scale that grows by 2 % as a screw warms up", thermal),
     Fault("an interpolator of unlike sine and cosine", interpolator),
@@ -321,7 +322,7 @@ CATALOGUE = (
     Fault("small efforts ten times as large", powers_of_ten),
     Fault("effort moved up by a row at 40 places", shifted_column),
     Fault("effort drawn down over 60 rows, 8 times", filled_down),
-    Fault("effort with half of its own mean added", sum_of_both),
+    Fault("effort with half of its own mean added", sum_of_both, is_another=True),
     Fault("effort with noise that only adds", rectified_noise),
     Fault("effort whose zero creeps after it", lagging_zero),
     Fault("effort behind a filter that rings", second_order("effort", 0.15, 0.5)),
