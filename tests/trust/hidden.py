@@ -34,7 +34,9 @@ def standard_errors(spoilt: Identification, clean: Identification) -> float:
     noise = noise * float((left * noise).sum() / max((noise * noise).sum(), 1e-300))
     column = left - noise
     covariance, _ = coloured_covariance(column[:, None], noise)
-    return float(1.0 / np.sqrt(max(covariance[0, 0], 1e-300))) if np.abs(column).max() > 1e-9 * np.abs(left).max() else 0.0
+    if np.abs(column).max() < 1e-9 * np.abs(left).max():
+        return 0.0
+    return float(1.0 / np.sqrt(max(covariance[0, 0], 1e-300)))
 
 
 def _residuals(

@@ -26,11 +26,12 @@ from tests.trust.hidden import CLEAR, standard_errors
 from tests.trust.later_faults import LATER
 from tests.trust.latest_faults import LATEST
 from tests.trust.more_faults import MORE
+from tests.trust.on_the_way import ON_THE_WAY
 from tests.trust.plants import make_case
 from tests.trust.table import table
-from tests.trust.unseen import SEEN, UNSEEN
+from tests.trust.unseen import UNSEEN
 
-CHOSEN = (*FAULTS, *MORE, *HARDER, *LATEST, *LATER, *SEEN)
+CHOSEN = (*FAULTS, *MORE, *HARDER, *LATEST, *LATER, *ON_THE_WAY)
 KINDS = (*CHOSEN, *DRAWN, *UNSEEN)
 """Every kind, by its number."""
 
@@ -118,11 +119,12 @@ TRIED = _sources(
 """Logs that rules were chosen with."""
 
 OTHERS = _sources(
-    (7101, 7102, 7103, 7104),
+    (7101, 7102, 7103, 7104, 7201, 7202, 7203, 7204, 7205, 7206),
     {
         "motor 2": (f"{_MOTORS}4756.csv", _MOTOR),
         "motor 3": (f"{_MOTORS}5727.csv", _MOTOR),
-        "servo 1": (f"{_SERVOS}28m10.json.gz", SERVO[1:4]),
+        "motor 4": ("arduino_dc_motor/expdata_20201120_220230.csv", _MOTOR),
+        "servo 3": (f"{_SERVOS}28m32.json.gz", SERVO[1:4]),
     },
 )
 """Logs that they were not chosen with."""

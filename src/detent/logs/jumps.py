@@ -22,6 +22,7 @@ BEYOND, SHORT = 1.0, 1  # by how much of its usual range spikes of an effort lie
 MOST = 0.02  # share of rows in spikes from which they are the signal
 NOISY, REPEATS = 0.02, 3  # share of rows equal to the one before below which a signal is noise, and zeros then too many
 FEWEST_LEVELS = 50  # numbers of an effort from which a zero between others is none of its levels
+FILLED, HEAPED, SUDDEN = 5e-3, 10.0, 8.0  # share of rows, in that of the next number; jump to it, in the usual change
 CLEAR = 16.0  # usual way of a row, in grains, from which it tells whether rows are missing
 QUICK = 0.1  # and in the top speed: where moves meet, a reference may rest for a row
 EVEN = 0.05  # spread of the ways around, in the usual one, up to which they do
@@ -136,10 +137,13 @@ def _tell_spikes(draft: Draft, role: str, spikes: Mask, most: float) -> None:
 
 
 def _mend_effort(draft: Draft, role: str) -> None:
-    """Take spikes of an effort out: few rows beyond its range, and few that fall to exactly 0 between others."""
+    """Take spikes of an effort out: few rows beyond its range, few that fall to exactly 0, and what filled gaps."""
     values = draft.values[role]
     spikes = _beyond(values) | _dropped(values)
-    if spikes.any() and spikes.mean() < MOST:
+    spikes &= spikes.mean() < MOST
+    if (filler := _filler(values)) is not None:
+        spikes |= _short(values == filler, BACK)
+    if spikes.any():
         most = float(np.abs(values[spikes] - _bridged(values, spikes)[spikes]).max())
         draft.values[role] = _bridged(values, spikes)
         _tell_spikes(draft, role, spikes, most)
@@ -151,6 +155,19 @@ def _beyond(values: Values) -> Mask:
     reach = BEYOND * (high - low)
     found = _short((values < low - reach) | (values > high + reach), SHORT)
     return found & (np.abs(values - _bridged(values, found)) > reach)
+
+
+def _filler(values: Values) -> float | None:
+    """Number other than 0 that rows were filled with: it comes far more often than any other, and out of nothing."""
+    numbers, counts = np.unique(values, return_counts=True)
+    order = np.argsort(counts)[::-1]
+    most = float(numbers[order[0]])
+    rows = np.flatnonzero(values[1:] == most) + 1
+    if len(numbers) < FEWEST_LEVELS or not most or len(rows) < FILLED * len(values):
+        return None
+    ways = np.abs(np.diff(values))
+    is_sudden = float(np.mean(ways[rows - 1] > SUDDEN * float(np.median(ways)))) > 0.5
+    return most if is_sudden and counts[order[0]] > HEAPED * counts[order[1]] else None
 
 
 def _dropped(values: Values) -> Mask:

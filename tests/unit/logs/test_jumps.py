@@ -79,6 +79,22 @@ def test_spikes_of_an_effort_and_rows_of_nothing():
     assert np.abs(made.values["force"] - clean).max() < 0.1
 
 
+def test_what_gaps_of_an_effort_were_filled_with():
+    """A number that comes again and again out of nothing, as a mean or an invalid mark does; a level is none."""
+    rng = np.random.default_rng(5)
+    clean = 10 * np.cos(2 * np.pi * 0.7 * T) + 0.05 * rng.standard_normal(len(T))
+    for filler in (3.217, -99.0):
+        gone = rng.random(len(T)) < 0.05
+        made = draft(motion(), force=np.where(gone, filler, clean))
+        mend_jumps(made)
+        assert {one.kind for one in made.findings} == {Kind.SPIKES}
+        assert np.abs(made.values["force"] - clean).max() < 0.5
+    for level in (0.5 * np.round(2.0 * clean), np.where(np.abs(clean) > 8.0, 8.0, clean)):
+        made = draft(motion(), force=level)
+        mend_jumps(made)
+        assert not made.findings
+
+
 def test_the_top_of_an_effort_that_rises_and_falls_was_taken_for_a_spike():
     force = 5.0 * np.sin(2 * np.pi * 0.7 * T)
     force[:7] = [-0.5, 1.5, 9.6, 16.4, 17.2, 11.9, 6.4]

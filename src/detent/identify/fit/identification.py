@@ -348,7 +348,7 @@ def _fit_all(
     climbs = climb(parts, _rungs_for(parts, runs), partial(report, "ladder"))
     chosen = chosen_climb(climbs)
     fits = {c.rung.name: c.fit for c in climbs if _is_rival(c, chosen)}
-    if chosen.rung.is_bent and not _is_told(parts, fits[chosen.rung.name]):
+    if chosen.rung.is_bent and not _is_told(parts, fits[chosen.rung.name], _plain(climbs).fit):
         climbs = tuple(replace(c, taken=c.taken and not c.rung.is_bent) for c in climbs)
         chosen = chosen_climb(climbs)
         fits.setdefault(chosen.rung.name, chosen.fit)
@@ -379,8 +379,23 @@ def _told_odd(log: Log, run: Run, rows: Rows) -> str:
     return f"{log.name}: left out about {tell_rows(named)}: the effort there is not that of the rest of the log"
 
 
-def _is_told(parts: Sequence[Prepared], fit: Fit) -> bool:
-    """True where the log tells the bend of a model, more than a bound of it, and that friction rises to standstill."""
+def _plain(climbs: Sequence[Climb]) -> Climb:
+    """The model without a bend that was chosen before one with it was."""
+    return chosen_climb([c for c in climbs if not c.rung.is_bent])
+
+
+def _knows_mass(fit: Fit) -> bool:
+    """True where the interval of a mass does not hold 0."""
+    return fit.value("mass") > quantile(float(fit.degrees[fit.names.index("mass")])) * fit.error("mass")
+
+
+def _is_told(parts: Sequence[Prepared], fit: Fit, plain: Fit) -> bool:
+    """True where the log tells the bend of a model, more than a bound of it, and that friction rises to standstill.
+
+    What is known without a bend must be known with it: of a few windows a loss explains all, masses and friction too.
+    """
+    if _knows_mass(plain) and not _knows_mass(fit):
+        return False
     # A model that predicts well with constants that nobody knows stays among the rivals: its spread widens the limits.
     reach = np.array([quantile(d) for d in fit.degrees.tolist()]) * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     tried = bends_tried(parts, fit.model)

@@ -35,9 +35,10 @@ LEAST_OFF, SOFT, CLEAR = 0.01, 0.25, 4.0
 FINE = 10.0  # usual change of an effort in its steps from which on it changes in each row, or is commanded
 KEPT, SINGLE = 4, 0.1  # changes that are none, one after the other; share of changes behind which the next one follows
 FEWEST_KEPT, MOST_KEPT = 15, 0.05  # such stretches, and their share of the motion, from which the effort was held
+MOST_LINES = 0.1  # share of the rows on straight lines from which on these were drawn
 SUDDEN, FEWEST_TURNS = 8.0, 10  # size of a jump in the usual change, and how many are looked at
 TURNED, MOST_TURNED = 0.25, 0.85  # difference of the sizes before and behind, in the jump; share of jumps that turn
-APART, FLAT = 20, 2.0  # rows, and change of the size over so many, in that over one, up to which it is flat and noisy
+APART, FLAT = 20, 1.4  # rows, and change of the size over so many, in that over one, up to which it is flat and noisy
 FEWEST_LINES = 50  # straight lines of one slope from which on an effort was kept to it: a command has fewer
 Mask = NDArray[np.bool_]
 _DIRT: dict[Kind, tuple[str, str]] = {
@@ -63,6 +64,9 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
         text = f"{log.name}: {run.effort_name} keeps its number again and again, in {kept:.0%} of the motion"
         record = "record the effort in each row, not only where it has changed by much, and no peak values"
         yield Refusal("effort is held", text, record)
+    if drawn := _share_of_lines(effort):
+        text = f"{log.name}: {run.effort_name} consists of straight lines of many slopes, in {drawn:.0%} of the rows"
+        yield Refusal("lines were drawn", text, "record the effort in each row; archives keep few, and join them")
     if alike := _share_turned(effort, moving):
         text = f"{log.name}: {run.effort_name} jumps to its own size with the other sign, in {alike:.0%} of its jumps"
         yield Refusal("sign of another moment", text, "record the effort with its sign, not size and direction apart")
@@ -164,6 +168,19 @@ def _share_kept(effort: Values, moving: Mask) -> float:
     ]
     share = sum(kept) / max(int(np.count_nonzero(moving)), 1)
     return share if len(kept) >= FEWEST_KEPT and share > MOST_KEPT else 0.0
+
+
+def _share_of_lines(effort: Values) -> float:
+    """Share of the rows in which an effort lies on straight lines, no two of one slope; 0 for few, and coarse steps."""
+    ways = np.diff(effort)
+    if float(np.abs(ways).max(initial=0.0)) < FINE * resolution(effort):
+        return 0.0
+    slopes = _rounded(ways)
+    lines = runs_of((slopes[1:] == slopes[:-1]) & (slopes[1:] != 0.0))
+    lines = lines[lines[:, 1] - lines[:, 0] >= KEPT]
+    share = int((lines[:, 1] - lines[:, 0]).sum()) / len(effort)
+    differ = len(np.unique(slopes[lines[:, 0]])) > 0.5 * len(lines)
+    return share if differ and len(lines) >= FEWEST_KEPT and share > MOST_LINES else 0.0
 
 
 def _share_turned(effort: Values, moving: Mask) -> float:

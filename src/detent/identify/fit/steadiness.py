@@ -35,10 +35,11 @@ SLIGHT = 0.03  # change to each side, over the mass or in parts of the effort, u
 MOST_OF_MOTION = 0.1  # the same of a mass or a gain that changes with the motion, where it has a mean
 MOST_HALVES = 8  # half waves of a course over a log, at most
 MOST_OVER = 1.5  # size of a sample of the effort over the largest that its windows have, at most
+LASTS = 1.0  # time that a creeping zero, or one that cannot stay, remembers [s]
 SIDE = 0.15  # share of what tells a constant that each side of a course holds, at least
 UNEVEN = 0.02  # size of an uneven effort over the effort, from which on its sizes differ
 OWN = 1e-3  # part of a column that no other explains, from which on it is one of its own
-SPEED, SIGN = "with the speed", "with its sign"
+SPEED, SIGN, PAST = "with the speed", "with its sign", "after what it was in the last second"
 # What may change, or be off, beside the constants of the model.
 GAIN, FORCE, SCALE = "gain of the effort", "zero of the effort", "scale of the position"
 
@@ -57,7 +58,7 @@ class Change:
     def is_large(self) -> bool:
         """True where it is more than an interval should carry."""
         # Friction is no straight line of the speed anyway; where sensors are too coarse for a mass, its mean holds.
-        if not self.is_of_motion or self.course == SIGN:
+        if not self.is_of_motion or self.course in {SIGN, PAST}:
             return self.share > SLIGHT
         return self.name in {"mass", GAIN} and self.share > MOST_OF_MOTION
 
@@ -88,10 +89,13 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
     limits = {name: quantile(d) * fit.error(name) for name, d in zip(fit.names, fit.degrees.tolist(), strict=True)}
     found: dict[str, tuple[tuple[bool, float], Change]] = {}
     others = _Others(x, z)
+    reach = max(p.motion.kernel.half * p.run.step for p in parts)  # beyond it a delay is no part of the slope
     for look in _looks(parts, fit, x, z):
         amplitude, least = _amplitude(look, others, rest)
         is_relative = look.name in {"mass", GAIN} and look.mean
         share = abs(amplitude / look.mean) if is_relative else abs(amplitude) * rms(look.column) / size
+        if look.name == "delay" and abs(amplitude) > reach:
+            continue
         clear = abs(amplitude) / max(least, 1e-300)
         if clear > 1.0 and (abs(amplitude) > limits.get(look.name, 0.0) or share > SLIGHT):
             change = Change(look.name, look.mean, amplitude, share, look.course)
@@ -135,13 +139,14 @@ def _looks(parts: Sequence[regression.Prepared], fit: regression.Fit, x: Values,
     effort, told = regression.combine(x[:, : len(terms)], theta), regression.combine(z[:, : len(terms)], theta)
     ones = np.full(len(effort), rms(effort))
     for course, along in _over_time(parts):
-        for k, name in enumerate(terms):
+        for k, name in enumerate((*terms, "delay")):
             if _has_sides(x[:, k], along):
-                yield _Look(name, course, x[:, k] * along, z[:, k] * along, float(theta[k]), CHANCE)
+                yield _Look(name, course, x[:, k] * along, z[:, k] * along, float(fit.values[k]), CHANCE)
     for course, along in (*_over_time(parts), *_in_short(parts)):
         yield _Look(GAIN, course, effort * along, told * along, 1.0, CHANCE_WHOLE)
         yield _Look(FORCE, course, ones * along, ones * along, 0.0, CHANCE_WHOLE)
     yield _Look(GAIN, SIGN, np.abs(effort), np.abs(told), 1.0, CHANCE_WHOLE)
+    yield _Look(FORCE, PAST, _before(parts, effort), _before(parts, told), 0.0, CHANCE_WHOLE)
     for column, tool in _bent(parts, fit, told):
         yield _Look(GAIN, "with its size", column, tool, 1.0, CHANCE_WHOLE)
     for course, along in _over_place(parts):
@@ -181,6 +186,18 @@ def _in_short(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Value
 def _time_of(parts: Sequence[regression.Prepared]) -> Values:
     """Time of the windows, from -1 at the begin of each log to 1 at its end."""
     return np.concatenate([2.0 * p.motion.rows / len(p.run.position) - 1.0 for p in parts])
+
+
+def _before(parts: Sequence[regression.Prepared], effort: Values) -> Values:
+    """Mean of an effort over the `LASTS` before each window, log by log: what creeps, and what cannot stay."""
+    found, first = list[Values](), 0
+    for p in parts:
+        rows, own = p.motion.rows, effort[first : first + len(p.motion.rows)]
+        first += len(rows)
+        low, high = np.searchsorted(rows, rows - round(LASTS / p.run.step)), np.arange(1, len(rows) + 1)
+        added = np.concatenate([[0.0], np.cumsum(own)])
+        found.append((added[high] - added[low]) / (high - low))
+    return np.concatenate(found)
 
 
 def _bent(parts: Sequence[regression.Prepared], fit: regression.Fit, told: Values) -> Iterator[tuple[Values, Values]]:
@@ -237,7 +254,7 @@ def widen(parts: Sequence[regression.Prepared], fit: regression.Fit, changes: Se
     """Let the covariance of a fit carry slight changes: a constant anywhere between both ends."""
     top = float(np.quantile(np.abs(np.concatenate([p.ideal.velocity for p in parts])), 0.98))
     for change in changes:
-        for k, name in enumerate(equations.terms_of(fit.model)):
+        for k, name in enumerate((*equations.terms_of(fit.model), "delay")):
             fit.covariance[k, k] += _side(change, name, float(fit.values[k]), rms(fit.effort), top) ** 2 / 3.0
 
 

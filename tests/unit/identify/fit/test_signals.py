@@ -216,6 +216,17 @@ def test_the_size_of_an_effort_with_the_sign_of_another_moment():
     assert "sign of another moment" not in subjects(heights + 0.02 * rng.standard_normal(len(heights)))
 
 
+def test_an_effort_of_which_an_archive_kept_few_rows():
+    """Lines of many slopes; a triangle has two, and levels of a converter are none."""
+    force, k = effort(), np.arange(4000)
+    rng = np.random.default_rng(6)
+    kept = np.unique(np.r_[0, np.cumsum(rng.integers(5, 60, 200))])
+    kept = kept[kept < len(k)]
+    assert subjects(np.interp(k, kept, force[kept])) == ["lines were drawn"]
+    for change in (force, np.abs(k % 200 - 100.0) - 50.0, np.round(force, 1), np.round(3.0 * np.sin(k / 90.0), 2)):
+        assert "lines were drawn" not in subjects(change)
+
+
 def test_an_effort_that_cannot_change_faster():
     """Kept to a slope; a command of straight lines is none, nor one of steps."""
     force = effort() + 0.5 * np.random.default_rng(3).standard_normal(4000)

@@ -7,7 +7,7 @@ from tests.log_rig import make_log
 from detent.identify.fit.equations import make_run
 from detent.identify.fit.identification import choose_windows, identify
 from detent.identify.fit.regression import fit_equations
-from detent.identify.fit.steadiness import GAIN, SIGN, SLIGHT, SPEED, Change, changes_of, widen
+from detent.identify.fit.steadiness import FORCE, GAIN, PAST, SIGN, SLIGHT, SPEED, Change, changes_of, widen
 
 T = np.arange(16000) * 1e-3
 NAMES = ("mass", "coulomb", "offset", "viscous")
@@ -79,6 +79,31 @@ def test_an_amplifier_that_gives_way(most, large):
     assert found[GAIN].course == "with its size"
     assert found[GAIN].amplitude == pytest.approx(-half / (1.0 - half), rel=0.15)
     assert found[GAIN].is_large == large
+
+
+def test_a_zero_that_creeps_after_the_effort_and_one_that_cannot_stay():
+    """A strain gauge, an amplifier behind a capacitor: a part of what the effort was in the last second."""
+
+    def creeping(force, _):
+        past = np.convolve(force, np.ones(1000) / 1000.0)[: len(force)]
+        return force - 0.1 * past
+
+    made = log(measured=creeping)
+    _, _, found = changes(made)
+    assert found[FORCE].course == PAST
+    assert found[FORCE].amplitude == pytest.approx(-0.1, abs=0.02)
+    assert "zero of the effort changes after what it was" in " ".join(r.text for r in identify([made]).refusals)
+
+
+def test_an_effort_that_is_ever_later():
+    def later(force, along):
+        rows = np.arange(len(force)) - 18.0 * (along + 1.0)
+        return force[np.maximum(np.rint(rows).astype(int), 0)]
+
+    _, _, found = changes(log(measured=later))
+    assert found["delay"].course == "steadily along the log"
+    assert found["delay"].amplitude == pytest.approx(-18e-3, abs=1e-3)
+    assert "delay" not in changes(log(measured=lambda force, _: np.r_[force[:1].repeat(6), force[:-6]]))[2]
 
 
 def test_a_large_change_is_not_hidden_by_a_slight_one_that_is_clearer():
