@@ -1,7 +1,7 @@
 """Kinds of faults that nobody chose: put together by lot of what happens, to what, and where in a log.
 
-No rule was chosen with them: they are judged once. Whoever looks at which of them are accepted and wrong, and chooses a
-rule by it, draws others.
+Whoever looks at which of them are accepted and wrong, and chooses a rule by it, draws others: `SEEN` are those that
+were looked at, `UNSEEN` those that are judged and left alone.
 """
 
 from collections.abc import Callable
@@ -29,12 +29,12 @@ def share(values: np.ndarray) -> np.ndarray:
 
 def stretch(table: Table, lot: Lots, rng: np.random.Generator) -> np.ndarray:
     half = lot.size(0.05, 0.2)
-    return (np.abs(course(table) - rng.uniform(-0.7, 0.7)) < 2.0 * half).astype(float)
+    return (np.abs(course(table) - rng.uniform(0.15, 0.85)) < half).astype(float)
 
 
 WHERE: dict[str, Where] = {
-    "ever more": lambda table, _, __: 0.5 * (course(table) + 1.0),
-    "from somewhere on": lambda table, _, rng: (course(table) > rng.uniform(-0.6, 0.6)).astype(float),
+    "ever more": lambda table, _, __: course(table),
+    "from somewhere on": lambda table, _, rng: (course(table) > rng.uniform(0.2, 0.8)).astype(float),
     "in a stretch": stretch,
     "here and there": lambda table, lot, rng: (rng.random(len(course(table))) < lot.size(0.01, 0.2)).astype(float),
     "up and down": lambda table, lot, _: 0.5 * (1.0 + np.sin(np.pi * lot.count(2, 20) * course(table))),
@@ -132,5 +132,6 @@ _ALL = [
     *(Fault(f"rows lost, {where} (drawn)", missing(WHERE[where])) for where in WHERE),
     *(Fault(f"a clock too fast or slow, {where} (drawn)", hurried(WHERE[where])) for where in WHERE),
 ]
-UNSEEN = tuple(_ALL[k] for k in sorted(np.random.default_rng(20261128).permutation(len(_ALL))[:40].tolist()))
-"""Forty of them, drawn before any was judged."""
+_LOTS = np.random.default_rng(20261128).permutation(len(_ALL)).tolist()
+SEEN, UNSEEN = (tuple(_ALL[k] for k in sorted(part)) for part in (_LOTS[:40], _LOTS[40:80]))
+"""Forty kinds that were judged once, and then looked at; and forty that no rule was chosen with."""

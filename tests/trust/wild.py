@@ -29,9 +29,9 @@ from tests.trust.more_faults import MORE
 from tests.trust.on_the_way import ON_THE_WAY
 from tests.trust.plants import make_case
 from tests.trust.table import table
-from tests.trust.unseen import UNSEEN
+from tests.trust.unseen import SEEN, UNSEEN
 
-CHOSEN = (*FAULTS, *MORE, *HARDER, *LATEST, *LATER, *ON_THE_WAY)
+CHOSEN = (*FAULTS, *MORE, *HARDER, *LATEST, *LATER, *ON_THE_WAY, *SEEN)
 KINDS = (*CHOSEN, *DRAWN, *UNSEEN)
 """Every kind, by its number."""
 

@@ -21,10 +21,11 @@ _HOLE = 1.4  # usual steps between two rows from which a third is missing there
 JITTER = 0.05  # deviation of a step from the usual one, as its share, from which it is irregular
 _ODD = 0.25  # deviation of a single step worth a note
 # Change of the step along a recording, over the step, from which the clock drifts, and in the usual change from one
-# step to the next: what comes unevenly is a sampler that waits, and its stamps are right.
-DRIFTS, EVENLY = 0.02, 10.0
-STEADY = 0.5  # share of the change between neighbouring eighths, at most
-EIGHTHS = 8  # parts of a recording whose mean steps are compared
+# step to the next: what comes unevenly is a sampler that waits, and its stamps are right. So is a solver that chooses
+# its steps, which change by more.
+DRIFTS, EVENLY, CHOSEN = 0.02, 10.0, 0.7
+STEADY = 0.4  # share of the change between neighbouring parts, at most
+MOST_PARTS = 128  # of a recording whose mean steps are compared
 WIDTHS = (16, 32)  # bits of counters that are tried where none are stated
 POSITIONS = ("position", "position_load", "reference")  # signals that come from counters
 
@@ -205,8 +206,9 @@ def look_at_clock(draft: Draft) -> None:
             text = f"{tell_count(len(odd), 'step')} other than the usual {usual * 1e3:.4g} ms"
             draft.note(Kind.IRREGULAR_TIME, "time", odd + 1, text, Action.LEFT, "", Severity.NOTE)
     if drift := _drift(steps[ratio < (2.5 if is_uneven else 1.5)]):
-        first, last = drift
-        text = f"steps go evenly from {first * 1e3:.4g} to {last * 1e3:.4g} ms: sampler and clock do not run together"
+        least, most = drift
+        span = f"{least * 1e3:.4g} and {most * 1e3:.4g} ms"
+        text = f"steps go evenly between {span}: sampler and clock do not run together"
         advice = "record time and rows by one clock, or identify parts alone"
         draft.note(Kind.DRIFTING_CLOCK, "time", [], text, Action.LEFT, advice, Severity.ERROR)
     if len(gaps):
@@ -216,17 +218,17 @@ def look_at_clock(draft: Draft) -> None:
 
 
 def _drift(steps: Values) -> tuple[float, float] | None:
-    """Mean steps of the first and the last eighth, of a clock that drifts from the one to the other; else None."""
-    if len(steps) < EIGHTHS * FEWEST:
+    """Shortest and longest mean steps of a clock that drifts from the one to the other, once or often; else None."""
+    if len(steps) < 8 * FEWEST:
         return None
-    means = np.array([float(part.mean()) for part in np.array_split(steps, EIGHTHS)])
+    means = np.array([float(part.mean()) for part in np.array_split(steps, min(len(steps) // FEWEST, MOST_PARTS))])
     usual, span = float(np.median(means)), float(np.ptp(means))
     scatter = float(np.median(np.abs(np.diff(steps))))
-    # A clock drifts all the way: a sampler that takes more turns in a part of a run does so from one row to the next.
-    is_steady = float(np.abs(np.diff(means)).max()) < STEADY * span and span <= abs(float(means[-1] - means[0]))
-    if span < DRIFTS * usual or span < EVENLY * scatter or not is_steady:
+    # A sampler that takes more turns in a part of a run does so from one row to the next.
+    is_steady = float(np.abs(np.diff(means)).max()) < STEADY * span
+    if not DRIFTS * usual <= span <= CHOSEN * usual or span < EVENLY * scatter or not is_steady:
         return None
-    return float(means[0]), float(means[-1])
+    return float(means.min()), float(means.max())
 
 
 def stretches(t: Values) -> list[slice]:
