@@ -127,7 +127,7 @@ def means_for_lost(table: Table, rng: np.random.Generator) -> Table:
     return with_(table, effort=np.where(gone, table["effort"].mean(), table["effort"]))
 
 
-def foretold(table: Table, rng: np.random.Generator) -> Table:
+def extrapolated(table: Table, rng: np.random.Generator) -> Table:
     """A position that goes on at its last speed where messages were lost: 25 times, 12 rows."""
     values = table["position"].copy()
     for at in rng.choice(np.arange(20, len(values) - 40), 25, replace=False).tolist():
@@ -299,7 +299,7 @@ ON_THE_WAY = (
     Fault("effort from an archive, lines within a fifth", swinging_door("effort", 0.2)),
     Fault("zeros for lost messages, 30 times", zeros_for_lost),
     Fault("the mean for one effort of 20", means_for_lost),
-    Fault("position foretold for 12 rows, 25 times", foretold),
+    Fault("position extrapolated for 12 rows, 25 times", extrapolated),
     Fault("one effort of 30 without its minus", minus_lost),
     Fault("12 rows again at six seams", overlapping),
     Fault("rows in turn from two loggers, 2 rows apart", two_loggers),

@@ -1,7 +1,7 @@
 """Kinds of faults that nobody chose: put together by lot of what happens, to what, and where in a log.
 
-Whoever looks at which of them are accepted and wrong, and chooses a rule by it, draws others: `SEEN` are those that
-were looked at, `UNSEEN` those that are judged and left alone.
+Rules were chosen with `SEEN`, and none with `UNSEEN`: which of these are accepted and wrong was looked at when they had
+been counted, and no rule came of it. Whoever chooses one by them draws others.
 """
 
 from collections.abc import Callable
@@ -134,4 +134,4 @@ _ALL = [
 ]
 _LOTS = np.random.default_rng(20261128).permutation(len(_ALL)).tolist()
 SEEN, UNSEEN = (tuple(_ALL[k] for k in sorted(part)) for part in (_LOTS[:40], _LOTS[40:80]))
-"""Forty kinds that were judged once, and then looked at; and forty that no rule was chosen with."""
+"""Forty kinds that rules were chosen with when they had been judged once, and forty that they were not."""

@@ -233,7 +233,8 @@ Each spoilt log goes the way of a user's log, and what is trusted of it is compa
   less than {clear:.1f} standard errors of the best test, that knows its form exactly, and the noise of the clean log.
 
 Rules were chosen with the kinds of the second table, and with {tried}. They were not chosen with the sizes of the
-first, nor with the kinds of the third, nor with {others}.
+first, nor with the kinds of the third, which are put together by lot of what happens, to what, and where; nor with
+{others}.
 
 Kinds of the last table make logs of other axes, which may exist, so that no log shows them: an effort that stands early
 is a delay, one that lacks what is added for friction is of an axis with less, one that is what a mass would need of an
@@ -252,7 +253,7 @@ def page(outcomes: Sequence[Outcome]) -> str:
     parts = {
         "The dirt of logs, in sizes drawn by lot": DRAWN,
         "Kinds that rules were chosen with": [fault for fault in CHOSEN if not fault.is_another],
-        "Kinds that nobody had planned for": UNSEEN,
+        "Kinds that nobody chose": UNSEEN,
         "What is the log of another axis": [fault for fault in CHOSEN if fault.is_another],
     }
     for title, part in parts.items():

@@ -30,7 +30,7 @@ from detent.identify.fit.ladder import (
 from detent.identify.fit.output_error import STRETCH, fit_output_error
 from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
 from detent.identify.fit.signals import look_at_log, scale_off
-from detent.identify.fit.steadiness import changes_of, widen
+from detent.identify.fit.steadiness import SCALE, Change, changes_of, widen
 from detent.identify.fit.verdict import (
     BETTER_MISSED,
     FAR_OFF,
@@ -207,6 +207,7 @@ def identify(
     width = 2e3 * kernel.half * kernel.step
     notes = (f"effort: {told}", f"windows of {width:.3g} ms, {windows} of them", _WAYS[parts[0].instruments])
     notes += tuple(_told_odd(log, run, rows) for log, run, rows in zip(logs, runs, odd, strict=True) if len(rows))
+    notes += tuple(_told_scale(change) for change in changes if change.name == SCALE)
     notes += (tested.believed,) if tested.believed else ()
     if not tested.believed and method != "output error" and (miss := missed(horizons)) > WELL_MET:
         notes += (f"held-out travel is missed by {miss:.0%}: --method output-error may predict it better",)
@@ -387,6 +388,12 @@ def _plain(climbs: Sequence[Climb]) -> Climb:
 def _knows_mass(fit: Fit) -> bool:
     """True where the interval of a mass does not hold 0."""
     return fit.value("mass") > quantile(float(fit.degrees[fit.names.index("mass")])) * fit.error("mass")
+
+
+def _told_scale(change: Change) -> str:
+    """A scale that is in doubt, in a sentence."""
+    off = f"position and reference differ by {change.share:.1%} in scale, or the loop is soft"
+    return f"{off}: no log tells which, the limits hold both"
 
 
 def _is_told(parts: Sequence[Prepared], fit: Fit, plain: Fit) -> bool:

@@ -55,21 +55,7 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
     """What is wrong with a log before anything is fitted; `runs` are those of all logs that are identified with it."""
     yield from _dirt(log)
     yield from _late(log, run)
-    effort = log.signals[run.effort_name]
-    moving = _moving(log.signals["position"])
-    if gone := _small_values_gone(effort, moving):
-        text = f"{log.name}: {run.effort_name} is never between 0 and {gone:.3g} {run.effort_unit}, and 0 in motion"
-        yield Refusal("small values are gone", text, "record the effort without a threshold below which it counts as 0")
-    if kept := _share_kept(effort, moving):
-        text = f"{log.name}: {run.effort_name} keeps its number again and again, in {kept:.0%} of the motion"
-        record = "record the effort in each row, not only where it has changed by much, and no peak values"
-        yield Refusal("effort is held", text, record)
-    if drawn := _share_of_lines(effort):
-        text = f"{log.name}: {run.effort_name} consists of straight lines of many slopes, in {drawn:.0%} of the rows"
-        yield Refusal("lines were drawn", text, "record the effort in each row; archives keep few, and join them")
-    if alike := _share_turned(effort, moving):
-        text = f"{log.name}: {run.effort_name} jumps to its own size with the other sign, in {alike:.0%} of its jumps"
-        yield Refusal("sign of another moment", text, "record the effort with its sign, not size and direction apart")
+    yield from _made_by_recorder(log, run)
     told = {"position", run.effort_name}
     stuck = float(log.mask(Kind.STUCK, signals=told).mean())
     if stuck > MOST_STUCK:
@@ -87,7 +73,9 @@ def look_at_log(log: Log, run: Run, runs: Sequence[Run] = ()) -> Iterator[Refusa
         yield Refusal("position leaves its reference", text, record)
     saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), _share_at_ends(run, runs))
     limits = {f"{run.effort_name} or position is at its limit": saturated}
-    limits[f"{run.effort_name} changes as fast as it ever does, and not faster,"] = _share_at_slope(effort)
+    limits[f"{run.effort_name} changes as fast as it ever does, and not faster,"] = _share_at_slope(
+        log.signals[run.effort_name]
+    )
     for what, share in limits.items():
         if share > MOST_SATURATED:
             text = f"{log.name}: {what} in {share:.0%} of the rows"
@@ -118,6 +106,25 @@ def _late(log: Log, run: Run) -> Iterator[Refusal]:
         if 1 < (rows := held_rows(values)) <= LONGEST_HELD / run.step:
             text = f"{log.name}: {what} changes every {rows} rows only: how old it is in between is not known"
             yield Refusal("coarse time", text, "record each signal as often as the rows are written", ("delay",))
+
+
+def _made_by_recorder(log: Log, run: Run) -> Iterator[Refusal]:
+    """Forms of an effort that no drive makes."""
+    effort = log.signals[run.effort_name]
+    moving = _moving(log.signals["position"])
+    if gone := _small_values_gone(effort, moving):
+        text = f"{log.name}: {run.effort_name} is never between 0 and {gone:.3g} {run.effort_unit}, and 0 in motion"
+        yield Refusal("small values are gone", text, "record the effort without a threshold below which it counts as 0")
+    if kept := _share_kept(effort, moving):
+        text = f"{log.name}: {run.effort_name} keeps its number again and again, in {kept:.0%} of the motion"
+        record = "record the effort in each row, not only where it has changed by much, and no peak values"
+        yield Refusal("effort is held", text, record)
+    if drawn := _share_of_lines(effort):
+        text = f"{log.name}: {run.effort_name} consists of straight lines of many slopes, in {drawn:.0%} of the rows"
+        yield Refusal("lines were drawn", text, "record the effort in each row; archives keep few, and join them")
+    if alike := _share_turned(effort, moving):
+        text = f"{log.name}: {run.effort_name} jumps to its own size with the other sign, in {alike:.0%} of its jumps"
+        yield Refusal("sign of another moment", text, "record the effort with its sign, not size and direction apart")
 
 
 def _rounded(ways: Values) -> Values:
