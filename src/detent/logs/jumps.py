@@ -8,7 +8,7 @@ an effort, which may jump, only what leaves all that it is otherwise, or falls t
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.logs.differences import grain, median_of_nine, runs_of
+from detent.logs.differences import MOST_ROWS, grain, median_of_nine, runs_of
 from detent.logs.headings import EFFORTS
 from detent.logs.log import Action, Draft, Kind, Severity, Values, tell_count
 
@@ -159,15 +159,15 @@ def _beyond(values: Values) -> Mask:
 
 def _filler(values: Values) -> float | None:
     """Number other than 0 that rows were filled with: it comes far more often than any other, and out of nothing."""
-    numbers, counts = np.unique(values, return_counts=True)
-    order = np.argsort(counts)[::-1]
-    most = float(numbers[order[0]])
-    rows = np.flatnonzero(values[1:] == most) + 1
-    if len(numbers) < FEWEST_LEVELS or not most or len(rows) < FILLED * len(values):
+    numbers, counts = np.unique(values[:: max(len(values) // MOST_ROWS, 1)], return_counts=True)
+    if len(numbers) < FEWEST_LEVELS:
+        return None
+    most, (next_one, often) = float(numbers[np.argmax(counts)]), np.partition(counts, -2)[-2:].tolist()
+    rows = np.flatnonzero(values[1:] == most)
+    if not most or often < HEAPED * next_one or len(rows) < FILLED * len(values):
         return None
     ways = np.abs(np.diff(values))
-    is_sudden = float(np.mean(ways[rows - 1] > SUDDEN * float(np.median(ways)))) > 0.5
-    return most if is_sudden and counts[order[0]] > HEAPED * counts[order[1]] else None
+    return most if float(np.mean(ways[rows] > SUDDEN * float(np.median(ways)))) > 0.5 else None
 
 
 def _dropped(values: Values) -> Mask:

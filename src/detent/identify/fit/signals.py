@@ -167,13 +167,12 @@ def _share_kept(effort: Values, moving: Mask) -> float:
         return 0.0
     if np.count_nonzero(~same[1:] & ~same[:-1]) < SINGLE * len(changes):
         return 0.0
-    ends = (float(effort.min()), float(effort.max()))
-    kept = [
-        last - first
-        for first, last in runs_of(same).tolist()
-        if last - first >= KEPT and effort[first] not in ends and moving[first:last].mean() > 0.5
-    ]
-    share = sum(kept) / max(int(np.count_nonzero(moving)), 1)
+    runs = runs_of(same)
+    first, last = runs[:, 0], runs[:, 1]
+    long, in_motion = last - first, np.concatenate([[0], np.cumsum(moving)])
+    is_end = (effort[first] == effort.min()) | (effort[first] == effort.max())
+    kept = long[(long >= KEPT) & ~is_end & (in_motion[last] - in_motion[first] > 0.5 * long)]
+    share = int(np.sum(kept)) / max(int(in_motion[-1]), 1)
     return share if len(kept) >= FEWEST_KEPT and share > MOST_KEPT else 0.0
 
 
@@ -183,10 +182,10 @@ def _share_of_lines(effort: Values) -> float:
     if float(np.abs(ways).max(initial=0.0)) < FINE * resolution(effort):
         return 0.0
     slopes = _rounded(ways)
-    lines = runs_of((slopes[1:] == slopes[:-1]) & (slopes[1:] != 0.0))
-    lines = lines[lines[:, 1] - lines[:, 0] >= KEPT]
-    share = int((lines[:, 1] - lines[:, 0]).sum()) / len(effort)
-    differ = len(np.unique(slopes[lines[:, 0]])) > 0.5 * len(lines)
+    runs = runs_of((slopes[1:] == slopes[:-1]) & (slopes[1:] != 0.0))
+    runs = runs[runs[:, 1] - runs[:, 0] >= KEPT]
+    share, lines = int((runs[:, 1] - runs[:, 0]).sum()) / len(effort), slopes[runs[:, 0]]
+    differ = len(np.unique(lines)) > 0.5 * len(lines)
     return share if differ and len(lines) >= FEWEST_KEPT and share > MOST_LINES else 0.0
 
 
@@ -208,8 +207,8 @@ def _share_at_slope(effort: Values) -> float:
     ways = np.abs(np.diff(effort))
     if float(ways.max(initial=0.0)) < FINE * resolution(effort):
         return 0.0
-    is_most = _rounded(ways) == 1.0
-    return float(np.mean(is_most)) if len(runs_of(is_most)) >= FEWEST_LINES else 0.0
+    is_most: Mask = _rounded(ways) == 1.0
+    return float(np.count_nonzero(is_most)) / len(ways) if len(runs_of(is_most)) >= FEWEST_LINES else 0.0
 
 
 def _share_at_ends(run: Run, runs: Sequence[Run]) -> float:
