@@ -85,7 +85,8 @@ elif what == "refused":
     motor.user_setpoint.put(60.0, wait=False)
     time.sleep(0.5)
     found["set_point"] = motor.user_setpoint.get()
-    selector = EpicsSignalRO(f"{name}:selector", string=True)
+    # Read, not monitored: the first event of a monitor once held the first letter alone.
+    selector = EpicsSignalRO(f"{name}:selector", string=True, auto_monitor=False)
     selector.wait_for_connection(timeout=10)
     found["selector"] = selector.get()
     motor.motor_stop.put(1, wait=True)

@@ -23,8 +23,8 @@ _ODD = 0.25  # deviation of a single step worth a note
 # Change of the step along a recording, over the step, from which the clock drifts, and in the usual change from one
 # step to the next: what comes unevenly is a sampler that waits, and its stamps are right. So is a solver that chooses
 # its steps, which change by more.
-DRIFTS, EVENLY, CHOSEN = 0.02, 10.0, 0.7
-STEADY = 0.4  # share of the change between neighbouring parts, at most
+DRIFTS, EVENLY, CHOSEN = 0.02, 10.0, 0.5
+STEADY = 0.25  # share of the change between neighbouring parts, at most: turns of samplers come more suddenly
 MOST_PARTS = 128  # of a recording whose mean steps are compared
 WIDTHS = (16, 32)  # bits of counters that are tried where none are stated
 POSITIONS = ("position", "position_load", "reference")  # signals that come from counters
