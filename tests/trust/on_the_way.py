@@ -1,6 +1,6 @@
 """Faults by what logs go through on their way: sensors, wires, clocks, memory, programs, people.
 
-All were written down before any was judged, and parted by lot: rules were chosen with one half (13 of 100 logs were
+All were written down before any was judged, and parted by lot: rules were chosen with one half (12 of 100 logs were
 accepted and wrong, 6 without two kinds that make logs of other axes), and the other was judged once (12 of 100) before
 rules were chosen with that too.
 """
