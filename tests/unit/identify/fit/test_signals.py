@@ -162,9 +162,9 @@ def effort(seconds=8.0):
     return Recorder(seconds=seconds).columns()[3]
 
 
-def subjects(force, position=None):
-    t, _, clean, _ = Recorder(seconds=len(force) * 0.002).columns()
-    log = make_log(t, {"position": clean if position is None else position, "force": force})
+def subjects(force):
+    t, _, position, _ = Recorder(seconds=len(force) * 0.002).columns()
+    log = make_log(t, {"position": position, "force": force})
     return [r.subject for r in look_at_log(log, make_run(log))]
 
 
