@@ -238,7 +238,8 @@ first, nor with the kinds of the third, which are put together by lot of what ha
 
 Kinds of the last table make logs of other axes, which may exist, so that no log shows them: an effort that stands early
 is a delay, one that lacks what is added for friction is of an axis with less, one that is what a mass would need of an
-axis with none. So is, where friction is nearly all of the effort, another gain of it one way.
+axis with none; one that is larger throughout is of a larger axis, and one that a dead zone is added to is of an axis
+with more friction. So is, where friction is nearly all of the effort, another gain of it one way.
 """
 
 

@@ -14,7 +14,7 @@ from detent.identify.fit.estimate import Estimate, quantile, rms
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb, chosen_climb
 from detent.identify.fit.regression import Fit, Prepared, make_effort, residuals_of
-from detent.identify.fit.steadiness import FORCE, GAIN, Change
+from detent.identify.fit.steadiness import FORCE, GAIN, PAST, Change
 from detent.identify.fit.windows import MOST_OUT, Moved, sticks_out
 from detent.logs.log import Values
 
@@ -226,6 +226,9 @@ def _told(run: Run, change: Change, fit: Fit) -> tuple[str, str]:
     size = rms(fit.effort) if change.name == FORCE else 1.0
     ends = f"{size * (change.mean - change.amplitude):.4g} to {size * (change.mean + change.amplitude):.4g} {unit}"
     text = f"{change.name} changes {change.course}, from {ends}: it is not of one axis and one effort"
+    if change.course == PAST:
+        text = f"{change.name} follows what the effort was in the last second, by {abs(change.amplitude):.1%} of it"
+        return text, "look for a sensor that creeps, an amplifier that holds no steady value, a slow filter"
     if not change.is_of_motion:
         what = "a load put on, an offset or gain of the sensor, a clock that drifts"
         return text, f"look for {what}; identify parts alone"

@@ -92,7 +92,8 @@ def test_a_zero_that_creeps_after_the_effort_and_one_that_cannot_stay():
     _, _, found = changes(made)
     assert found[FORCE].course == PAST
     assert found[FORCE].amplitude == pytest.approx(-0.1, abs=0.02)
-    assert "zero of the effort changes after what it was" in " ".join(r.text for r in identify([made]).refusals)
+    told = " ".join(r.text for r in identify([made]).refusals)
+    assert "zero of the effort follows what the effort was in the last second, by " in told
 
 
 def test_an_effort_that_is_ever_later():
