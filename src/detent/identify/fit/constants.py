@@ -7,7 +7,7 @@ inference", Biometrics 53 (1997)).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -131,6 +131,13 @@ def reaching(constants: Constants, others: Constants) -> Constants:
         far += quantile(float(others.degrees[j])) * float(others.errors[j])
         covariance[k, k] = max(covariance[k, k], (far / quantile(float(constants.degrees[k]))) ** 2)
     return replace(constants, covariance=covariance)
+
+
+def further(constants: Constants, times: Mapping[str, float]) -> Constants:
+    """Constants whose intervals reach so many times as far: those of the terms that they are sums of, the largest."""
+    usual = float(np.median(list(times.values())))
+    reach = [max((times[term] for term in _SUMS[name] if term in times), default=usual) for name in constants.names]
+    return replace(constants, covariance=constants.covariance * np.outer(reach, reach))
 
 
 def hanging_position(constants: Constants) -> float:

@@ -184,6 +184,16 @@ def coloured_covariance(
     return found[0] * np.outer(grow, grow) / np.outer(size, size), degrees
 
 
+def lasting(columns: Values, residual: Values, instruments: Values) -> Values:
+    """Errors of constants by coloured residuals, in those by independent ones of the same sizes, shape (k,)."""
+    size, length = column_sizes(columns), column_sizes(instruments)
+    tools = instruments / length
+    weight = tools @ np.asarray(np.linalg.pinv(tools.T @ (columns / size), rcond=RANK), np.float64).T
+    alone = np.sum((weight * residual[:, None]) ** 2, axis=0) / size**2
+    coloured = np.diag(coloured_covariance(columns, residual, instruments)[0])
+    return np.sqrt(np.where(alone > 0.0, coloured / np.where(alone > 0.0, alone, 1.0), 1.0))
+
+
 def carried_degrees(columns: Values, residual: Values, instruments: Values, cosines: int) -> Values:
     """Degrees of freedom behind the variance of each constant, from 1 to the cosines."""
     # A sum of squares ``h^2 e^2`` of normal residuals has ``(sum h^2)^2 / sum h^4`` (Satterthwaite), times

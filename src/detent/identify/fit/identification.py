@@ -11,7 +11,8 @@ import numpy as np
 from detent.errors import DetentError, InputError
 from detent.files.screen import OnScreen
 from detent.identify.fit import untold
-from detent.identify.fit.constants import Constants, constants_of, reaching
+from detent.identify.fit.constants import Constants, constants_of, further, reaching
+from detent.identify.fit.doubt import doubt_of
 from detent.identify.fit.equations import LOSS, Rows, Run, make_kernel, make_run
 from detent.identify.fit.estimate import Estimate, quantile
 from detent.identify.fit.free_run import ClosedLoop, Horizon, simulate_closed_loop, simulate_horizons
@@ -61,6 +62,7 @@ WIDEST_BEND = 0.5  # half of the interval of a Stribeck velocity or a loss over 
 CLEARLY = 3.0  # gain of a rung that cannot be, in standard errors, from which the chosen one lacks something
 ROUNDS_OUT = 3  # fits in which windows that stick out are left out, at most
 FEWEST_LEFT = 5 * len(RUNGS[-1].terms)  # windows of all logs, at least
+TOLD = 1.1  # times that limits reach further from which on the notes say so
 HELD_OUT = 0.25  # last part of a log that the simulation is tested on
 TURN = 0.5  # range of an angle from which on a weight may show [rad]
 _WAYS: dict[Instruments, str] = {
@@ -181,7 +183,8 @@ def identify(
     parts, (climbs, fit, rivals), odd = _fit_usual(parts, runs, report)
     runs = tuple(p.run for p in parts)
     windows = sum(len(p.motion.rows) for p in parts)
-    changes = [*changes_of(parts, fit), *scale_off(runs)]
+    changes, clearest = changes_of(parts, fit)
+    changes += scale_off(runs)
     own = replace(fit, covariance=fit.covariance.copy())
     widen(parts, fit, changes)
     constants = constants_of(fit, rivals)
@@ -202,12 +205,14 @@ def identify(
         if other.constants is not tested.constants:
             judged = _judge(runs, parts, climbs, other, refusals)
         tested = other
-    constants, horizons = tested.constants, tested.horizons
+    doubt = doubt_of(parts, own, clearest)
+    constants, horizons = further(tested.constants, doubt.times), tested.horizons
     kernel, told = parts[0].motion.kernel, f"{runs[0].effort_name} [{runs[0].effort_unit}]"
     width = 2e3 * kernel.half * kernel.step
     notes = (f"effort: {told}", f"windows of {width:.3g} ms, {windows} of them", _WAYS[parts[0].instruments])
     notes += tuple(_told_odd(log, run, rows) for log, run, rows in zip(logs, runs, odd, strict=True) if len(rows))
     notes += tuple(_told_scale(change) for change in changes if change.name == SCALE)
+    notes += (str(doubt),) if doubt.usual > TOLD else ()
     notes += (tested.believed,) if tested.believed else ()
     if not tested.believed and method != "output error" and (miss := missed(horizons)) > WELL_MET:
         notes += (f"held-out travel is missed by {miss:.0%}: --method output-error may predict it better",)

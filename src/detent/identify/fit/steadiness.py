@@ -79,16 +79,20 @@ class _Look(NamedTuple):
     chance: float
 
 
-def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> list[Change]:
-    """Terms of a fitted model whose constants change within the log by more than chance, the clearest course each."""
+def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> tuple[list[Change], float]:
+    """Terms of a fitted model whose constants change within the log by more than chance, the clearest course each.
+
+    Behind them how clear the clearest of all looks is, those included that are less than an interval: 1 is the end of
+    chance.
+    """
     x, z, effort = regression.columns_of(parts, fit)
     if len(x) < ROWS_EACH * (x.shape[1] + 1):
-        return []
+        return [], 0.0
     theta = regression.solve(z, x, effort)
     rest, size = effort - regression.combine(x, theta), max(rms(effort), 1e-300)
     limits = {name: quantile(d) * fit.error(name) for name, d in zip(fit.names, fit.degrees.tolist(), strict=True)}
     found: dict[str, tuple[tuple[bool, float], Change]] = {}
-    others = _Others(x, z)
+    clearest, others = 0.0, _Others(x, z)
     reach = max(p.motion.kernel.half * p.run.step for p in parts)  # beyond it a delay is no part of the slope
     for look in _looks(parts, fit, x, z):
         amplitude, least = _amplitude(look, others, rest)
@@ -97,11 +101,12 @@ def changes_of(parts: Sequence[regression.Prepared], fit: regression.Fit) -> lis
         if look.name == "delay" and abs(amplitude) > reach:
             continue
         clear = abs(amplitude) / max(least, 1e-300)
+        clearest = max(clearest, clear)
         if clear > 1.0 and (abs(amplitude) > limits.get(look.name, 0.0) or share > SLIGHT):
             change = Change(look.name, look.mean, amplitude, share, look.course)
             one = (change.is_large, clear), change  # a slight one that is clearer is not to hide a large one
             found[look.name] = max(found.get(look.name, one), one, key=itemgetter(0))
-    return [change for _, change in found.values()]
+    return [change for _, change in found.values()], clearest
 
 
 class _Others:
@@ -138,20 +143,20 @@ def _looks(parts: Sequence[regression.Prepared], fit: regression.Fit, x: Values,
     theta = fit.values[: len(terms)]
     effort, told = regression.combine(x[:, : len(terms)], theta), regression.combine(z[:, : len(terms)], theta)
     ones = np.full(len(effort), rms(effort))
-    for course, along in _over_time(parts):
+    for course, along in over_time(parts):
         for k, name in enumerate((*terms, "delay")):
             if _has_sides(x[:, k], along):
                 yield _Look(name, course, x[:, k] * along, z[:, k] * along, float(fit.values[k]), CHANCE)
-    for course, along in (*_over_time(parts), *_in_short(parts)):
+    for course, along in (*over_time(parts), *_in_short(parts)):
         yield _Look(GAIN, course, effort * along, told * along, 1.0, CHANCE_WHOLE)
         yield _Look(FORCE, course, ones * along, ones * along, 0.0, CHANCE_WHOLE)
     yield _Look(GAIN, SIGN, np.abs(effort), np.abs(told), 1.0, CHANCE_WHOLE)
     yield _Look(FORCE, PAST, _before(parts, effort), _before(parts, told), 0.0, CHANCE_WHOLE)
     for column, tool in _bent(parts, fit, told):
         yield _Look(GAIN, "with its size", column, tool, 1.0, CHANCE_WHOLE)
-    for course, along in _over_place(parts):
+    for course, along in over_place(parts):
         yield _Look(GAIN, course, effort * along, told * along, 1.0, CHANCE_WHOLE)
-    for course, along in _over_motion(parts):
+    for course, along in over_motion(parts):
         for k, name in enumerate(terms):
             is_looked_at = name == "mass" or (course == SPEED and name.startswith("viscous"))
             if is_looked_at and _has_sides(x[:, k], along):
@@ -164,7 +169,7 @@ def _has_sides(column: Values, along: Values) -> bool:
     return SIDE < float(power[along > 0.0].sum()) / max(float(power.sum()), 1e-300) < 1.0 - SIDE
 
 
-def _over_time(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
+def over_time(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
     """Courses over each log, shape (m,), with what they are called."""
     along = _time_of(parts)
     yield "steadily along the log", along
@@ -220,18 +225,18 @@ def _bent(parts: Sequence[regression.Prepared], fit: regression.Fit, told: Value
             yield column, bent(told, power)
 
 
-def _over_motion(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
+def over_motion(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
     """Courses with what the axis does, by the instruments, shape (m,)."""
     velocity, acceleration = (
         np.concatenate([getattr(p.ideal, name) for p in parts]) for name in ("velocity", "acceleration")
     )
     yield "with the direction", np.sign(velocity)
     yield "from braking to speeding up", np.sign(velocity * acceleration)
-    yield SPEED, _level(velocity)
-    yield "with the acceleration", _level(acceleration)
+    yield SPEED, level(velocity)
+    yield "with the acceleration", level(acceleration)
 
 
-def _over_place(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
+def over_place(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Values]]:
     """Courses over the travel of each log, shape (m,)."""
     places: list[Values] = []
     for p in parts:
@@ -244,7 +249,7 @@ def _over_place(parts: Sequence[regression.Prepared]) -> Iterator[tuple[str, Val
         yield f"up and down over the travel, in {halves} half waves", np.cos(0.5 * np.pi * halves * (along + 1.0))
 
 
-def _level(values: Values) -> Values:
+def level(values: Values) -> Values:
     """Sizes from -1 for nothing to 1 for the largest."""
     sizes = np.abs(values)
     return np.clip(2.0 * sizes / max(float(np.quantile(sizes, 0.98)), 1e-300) - 1.0, -1.0, 1.0)

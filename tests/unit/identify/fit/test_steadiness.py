@@ -27,7 +27,7 @@ def log(load=0.0, offset=0.0, seed=1, measured=lambda force, _: force):
 def changes(made):
     parts = choose_windows([make_run(made)])
     fit = fit_equations(parts, NAMES)
-    return parts, fit, {change.name: change for change in changes_of(parts, fit)}
+    return parts, fit, {change.name: change for change in changes_of(parts, fit)[0]}
 
 
 def test_constants_that_stay():
