@@ -133,5 +133,5 @@ _ALL = [
     *(Fault(f"a clock too fast or slow, {where} (drawn)", hurried(WHERE[where])) for where in WHERE),
 ]
 _LOTS = np.random.default_rng(20261128).permutation(len(_ALL)).tolist()
-SEEN, UNSEEN = (tuple(_ALL[k] for k in sorted(part)) for part in (_LOTS[:40], _LOTS[40:80]))
-"""Forty kinds that rules were chosen with when they had been judged once, and forty that they were not."""
+SEEN, UNSEEN = (tuple(_ALL[k] for k in sorted(part)) for part in (_LOTS[:80], _LOTS[80:]))
+"""Eighty kinds that rules were chosen with when they had been judged once, and eighty that they were not."""
