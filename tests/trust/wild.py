@@ -239,7 +239,8 @@ first, nor with the kinds of the third, which are put together by lot of what ha
 Kinds of the last table make logs of other axes, which may exist, so that no log shows them: an effort that stands early
 is a delay, one that lacks what is added for friction is of an axis with less, one that is what a mass would need of an
 axis with none; one that is larger throughout is of a larger axis, and one that a dead zone is added to is of an axis
-with more friction. So is, where friction is nearly all of the effort, another gain of it one way.
+with more friction, as is a zero that is another one way or with the speed. So is, where friction is nearly all of the
+effort, another gain of it one way.
 """
 
 
@@ -254,8 +255,8 @@ def page(outcomes: Sequence[Outcome]) -> str:
     parts = {
         "The dirt of logs, in sizes drawn by lot": DRAWN,
         "Kinds that rules were chosen with": [fault for fault in CHOSEN if not fault.is_another],
-        "Kinds that nobody chose": UNSEEN,
-        "What is the log of another axis": [fault for fault in CHOSEN if fault.is_another],
+        "Kinds that nobody chose": [fault for fault in UNSEEN if not fault.is_another],
+        "What is the log of another axis": [fault for fault in KINDS if fault.is_another],
     }
     for title, part in parts.items():
         names = [fault.name for fault in part]

@@ -266,11 +266,14 @@ def widen(parts: Sequence[regression.Prepared], fit: regression.Fit, changes: Se
 def _side(change: Change, name: str, value: float, effort: float, top: float) -> float:
     """By how much a change leaves a constant open to each side."""
     kind, _, way = change.name.partition(".")
-    is_force = name.startswith(("coulomb", "offset"))
+    is_force = name.startswith(("coulomb", "offset", "excess"))
     if change.name in {GAIN, SCALE}:
         return change.amplitude * value
     if change.name == FORCE:
         return change.amplitude * effort * is_force
+    # A mass changes with nothing that an axis does; what is not even is the effort, and friction is read from it too.
+    if change.name == "mass" and change.is_of_motion and name != "mass":
+        return change.share * effort * (is_force + 2.0 / top * name.startswith("viscous"))
     # Straight lines through the slow and the fast half of a parabola differ so where they meet the standstill.
     if change.course == SPEED and kind == "viscous" and name == f"coulomb{'.' if way else ''}{way}":
         return 0.5 * change.amplitude * top
