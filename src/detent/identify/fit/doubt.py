@@ -46,8 +46,8 @@ class Doubt:
     @property
     def times(self) -> dict[str, float]:
         """How many times further the limits of each term reach."""
-        by = math.exp(2.0 * max(self.uneven - USUAL, 0.0) + 4.0 * max(self.clearest - CHANCE, 0.0))
-        by *= LEAST_SQUARES if self.is_biased else 1.0
+        unlike = 2.0 * max(self.uneven - USUAL, 0.0) + 4.0 * max(self.clearest - CHANCE, 0.0)
+        by = math.exp(min(unlike, MOST)) * (LEAST_SQUARES if self.is_biased else 1.0)
         return {name: min(by * max(long / SHARED, 1.0) ** 2, MOST) for name, long in self.lasting.items()}
 
     @property
