@@ -143,3 +143,20 @@ def test_friction_that_bends_widens_both_constants_of_its_direction():
     sides = {"viscous": 0.6, "coulomb": 0.3 * top}
     for name, error in zip(fit.names, before, strict=True):
         assert fit.error(name) == pytest.approx(np.hypot(error, sides.get(name, 0.0) / np.sqrt(3)))
+
+
+def test_a_mass_that_changes_with_the_speed_widens_friction():
+    """The gain of the force rises with the speed: friction is read from it, and open by as much."""
+    speed = np.abs(np.gradient(log().signals["position"]))
+    parts, fit, found = changes(log(measured=lambda force, _: force * (1.0 + 0.06 * speed / speed.max())))
+    mass = found["mass"]
+    assert mass.course == SPEED
+    assert not mass.is_large
+    before = np.diag(fit.covariance).copy()
+    widen(parts, fit, [mass])
+    added = dict(zip(fit.names, np.sqrt(np.diag(fit.covariance) - before).tolist(), strict=True))
+    side, top = mass.share * float(np.sqrt(np.mean(fit.effort**2))), float(np.quantile(speed, 0.98)) / 1e-3
+    assert added["coulomb"] == pytest.approx(side / np.sqrt(3.0))
+    assert added["viscous"] == pytest.approx(2.0 * side / top / np.sqrt(3.0), rel=0.05)
+    assert added["mass"] == pytest.approx(abs(mass.amplitude) / np.sqrt(3.0))
+    assert added["delay"] == 0.0
