@@ -70,8 +70,9 @@ def test_a_voltage_of_two_levels_is_not_saturated(tmp_path: Path) -> None:
     found = identify_axis(written(tmp_path / "log.csv", rows))
     assert found.constants["mass"].value == pytest.approx(TRUTH["mass"], rel=0.02)
     # In positions rounded to millimetres, at two speeds, the friction is a quarter too small by windows of 80 ms, and
-    # was trusted so; by wider ones it is right, and what depends on the window is refused. The mass does not.
-    assert {refusal.subject for refusal in found.refusals} == {"depends on the window"}
+    # was trusted so; by wider ones it is right, and what depends on the window is refused. The mass does not, but seems
+    # to change with the speed: friction is as open as that leaves the effort.
+    assert {refusal.subject for refusal in found.refusals} == {"depends on the window", "not determined by the data"}
     assert {one.name for one in found.found.trusted} == {"mass"}
     assert all(found.constants[name].value < 0.85 * TRUTH[name] for name in ("coulomb.positive", "coulomb.negative"))
     assert all(one.low <= TRUTH[one.name] <= one.high for one in found.found.trusted)
