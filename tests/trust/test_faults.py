@@ -50,17 +50,15 @@ def test_few_spoilt_logs_are_accepted_and_wrong():
 @pytest.mark.long
 @pytest.mark.skipif(not DATA.exists(), reason="the recordings are not at hand")
 def test_usual_dirt_in_sizes_by_lot_is_refused_or_right():
-    """Two of a hundred logs wrong at most; and as many with a value outside that the widths do not put there.
+    """Two of a hundred logs wrong at most, and five with a value outside the interval of the clean log.
 
-    Five of a hundred with a value outside were asked for. The widths of the intervals of right values put as many there
-    (`left_outside`): fewer would be had only by refusing these.
+    The widths of the intervals of right values alone put about as many there (`left_outside`).
     """
     found = judge_faults([number for number, fault in enumerate(KINDS) if fault in DRAWN])
     assert len(found) > 100
     assert sum(bool(o.disjoint) for o in found) <= 0.02 * len(found), [o for o in found if o.disjoint]
-    by_chance = sum(o.by_chance for o in found)
-    assert by_chance > 0.04 * len(found)
-    assert sum(bool(o.outside) for o in found) - by_chance <= 0.02 * len(found), [o for o in found if o.outside]
+    assert sum(bool(o.outside) for o in found) <= 0.05 * len(found), [o for o in found if o.outside]
+    assert sum(o.by_chance for o in found) > 0.04 * len(found)
 
 
 def test_the_page_counts_each_log_once():
