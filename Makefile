@@ -94,7 +94,8 @@ bench-smoke: venv-test ## run every benchmark once, without measuring
 # Compiled code is invisible to coverage: the tests of the steps run as plain Python, but for those that simulate too
 # long. All other unit tests run compiled, and coverage looks on while `make test` does them: where that was before the
 # last edit, it does them again. Beside the steps run the panel's tests of the specification, and the faces, processes
-# of their own, with the tests of their clients: these wait more than they compute.
+# of their own, with the tests of their clients: these wait more than they compute, and are waited for by an axis whose
+# loop may not come late, so that the steps, which nobody waits for, are nice to them.
 BLOCKS   := $(addprefix tests/unit/,control drive planning plant sensing)
 STEPS    := $(BLOCKS) $(addprefix tests/unit/,kernel $(addprefix operate/test_,drivers.py loop.py watchdog.py)) \
             $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py live*.py plant.py system*.py))
@@ -109,7 +110,7 @@ coverage: venv-test $(REACHED).gw0 ## which lines and branches the unit tests re
 	        -m pytest -m "$(SEEN)" -k "not test_29 and not test_31" tests/acceptance/test_faces.py $(PYTEST_ARGS) && \
 	    COVERAGE_FILE=.coverage.panel $(COVER) \
 	        -m pytest -m "$(SEEN) and not process" -k "$(PANEL)" tests/acceptance/test_live.py $(PYTEST_ARGS)) & beside=$$!; \
-	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.steps $(PYTEST) -p tests.measured $(WHOLE_FILES) -p no:benchmark \
+	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.steps nice $(PYTEST) -p tests.measured $(WHOLE_FILES) -p no:benchmark \
 	    -m "$(SEEN) and not compiled and not process" $(STEPS) $(PYTEST_ARGS); steps=$$?; \
 	wait $$beside && test $$steps = 0
 	$(BIN)/python -m coverage combine $(REACHED).* .coverage.steps.* .coverage.panel .coverage.faces.*

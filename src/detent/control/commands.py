@@ -122,7 +122,7 @@ def why_not(q: OperationParams, o: Operation, r: Request) -> int:
         return STALE
     if o.client not in (0, r.client) and r.kind not in (TAKE, PAUSE, RESUME):  # who leads a job waits for its end
         return SECOND
-    if r.kind == LEAVE:
+    if r.kind in (TAKE, LEAVE):  # in a fault, too: who takes over may reset
         return 0
     if r.kind == RESET:
         return 0 if o.state == FAULT else NO_FAULT

@@ -283,6 +283,23 @@ def test_somebody_else_takes_over_and_leaves():
     assert desk.o.client == 0
 
 
+@pytest.mark.parametrize("looks", [1, 3])
+def test_who_takes_over_in_a_fault_may_reset_it(looks):
+    desk = Desk().enabled()
+    desk.a.fault = 12
+    desk.pass_looks(looks)
+    assert desk.o.state == (FAULT_REACTION if looks == 1 else FAULT)
+    desk.ask(ops.RESET, client=2)
+    assert desk.last[2] == ops.SECOND
+    taken = desk.ask(ops.TAKE, client=2)
+    assert desk.last == (taken, ops.DONE, 0, 0)
+    assert (desk.o.client, desk.o.fault, desk.o.demand.do) == (2, 12, ops.REST_OFF)
+    desk.a.fault = 0
+    desk.pass_looks(2)
+    desk.ask(ops.RESET, client=2)
+    assert (desk.o.state, desk.o.fault) == (SWITCH_ON_DISABLED, 0)
+
+
 def test_the_orders_of_a_control_word():
     desk = Desk()
     for order in (0, 1, 2):
