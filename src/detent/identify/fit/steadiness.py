@@ -58,7 +58,7 @@ class Change:
     def is_large(self) -> bool:
         """True where it is more than an interval should carry."""
         # Friction is no straight line of the speed anyway; where sensors are too coarse for a mass, its mean holds.
-        if not self.is_of_motion or self.course in {SIGN, PAST}:
+        if not self.is_of_motion or self.course in {SIGN, PAST} or self.name == "delay":
             return self.share > SLIGHT
         return self.name in {"mass", GAIN} and self.share > MOST_OF_MOTION
 
@@ -138,7 +138,7 @@ def _amplitude(look: _Look, others: _Others, rest: Values) -> tuple[float, float
 
 
 def _looks(parts: Sequence[regression.Prepared], fit: regression.Fit, x: Values, z: Values) -> Iterator[_Look]:
-    """Columns that tell changes: of each constant with time, of the mass and the whole effort with all."""
+    """Columns that tell changes: of each constant with time; of the mass, the whole effort and the delay with all."""
     terms = equations.terms_of(fit.model)
     theta = fit.values[: len(terms)]
     effort, told = regression.combine(x[:, : len(terms)], theta), regression.combine(z[:, : len(terms)], theta)
@@ -161,6 +161,11 @@ def _looks(parts: Sequence[regression.Prepared], fit: regression.Fit, x: Values,
             is_looked_at = name == "mass" or (course == SPEED and name.startswith("viscous"))
             if is_looked_at and _has_sides(x[:, k], along):
                 yield _Look(name, course, x[:, k] * along, z[:, k] * along, float(theta[k]), CHANCE_WHOLE)
+    # Signals that come by one way are as late wherever the axis is, and whatever it does.
+    k, late = len(terms), fit.value("delay")
+    for course, along in (*over_motion(parts), *over_place(parts), ("with the size of the effort", level(told))):
+        if _has_sides(x[:, k], along):
+            yield _Look("delay", course, x[:, k] * along, z[:, k] * along, late, CHANCE_WHOLE)
 
 
 def _has_sides(column: Values, along: Values) -> bool:

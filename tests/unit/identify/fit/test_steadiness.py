@@ -107,6 +107,27 @@ def test_an_effort_that_is_ever_later():
     assert "delay" not in changes(log(measured=lambda force, _: np.r_[force[:1].repeat(6), force[:-6]]))[2]
 
 
+@pytest.mark.parametrize(("course", "late"), [
+    ("with the direction", lambda place: np.gradient(place) > 0.0),
+    ("from end to end of the travel", lambda place: (place - place.min()) / np.ptp(place)),
+])  # fmt: skip
+@pytest.mark.parametrize(("rows", "large"), [(2.0, False), (30.0, True)])
+def test_an_effort_that_is_later_one_way_or_at_one_end(course, late, rows, large):
+    """One wire is as late whatever the axis does: a filter of one sign, a drum of cable, a position that is late."""
+
+    def later(force, _):
+        behind = np.rint(rows * late(log().signals["position"])).astype(int)
+        return force[np.maximum(np.arange(len(force)) - behind, 0)]
+
+    made = log(measured=later)
+    change = changes(made)[2]["delay"]
+    assert change.course == course
+    assert change.amplitude == pytest.approx(-0.5e-3 * rows, rel=0.15)
+    assert change.is_large == large
+    told = [r for r in identify([made]).refusals if r.subject == "changes with the motion"]
+    assert [r.text.partition(",")[0] for r in told] == [f"delay changes {course}"] * large
+
+
 def test_a_large_change_is_not_hidden_by_a_slight_one_that_is_clearer():
     """A step of 2 % in the middle of the log, and 4 % with the sign, which noise hides more of."""
     made = log(measured=lambda f, t: f * (1.0 + 0.02 * np.sign(t)) * np.where(f > 0.0, 1.02, 0.94))
