@@ -232,6 +232,8 @@ def _told(run: Run, change: Change, fit: Fit) -> tuple[str, str]:
     if not change.is_of_motion:
         what = "a load put on, an offset or gain of the sensor, a clock that drifts"
         return text, f"look for {what}; identify parts alone"
+    if change.name == "delay":
+        return text, "look for a filter or a sensor that is late in a part of the motion, a clock that is not even"
     return text, "look for an amplifier that is not even, a filter, a limit, a coarse sensor of the place"
 
 

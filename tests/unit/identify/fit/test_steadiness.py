@@ -126,6 +126,7 @@ def test_an_effort_that_is_later_one_way_or_at_one_end(course, late, rows, large
     assert change.is_large == large
     told = [r for r in identify([made]).refusals if r.subject == "changes with the motion"]
     assert [r.text.partition(",")[0] for r in told] == [f"delay changes {course}"] * large
+    assert all(r.record.startswith("look for a filter or a sensor that is late") for r in told)
 
 
 def test_a_large_change_is_not_hidden_by_a_slight_one_that_is_clearer():
