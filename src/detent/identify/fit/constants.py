@@ -122,14 +122,18 @@ def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Values, Values, Values]:
 
 def reaching(constants: Constants, others: Constants) -> Constants:
     """Constants whose intervals reach as far as those of another way to the same, which may lie elsewhere."""
-    known = {name: k for k, name in enumerate(others.names)}
+    own = dict(zip(constants.names, constants.values.tolist(), strict=True))
+    told = zip(others.names, others.values.tolist(), others.errors.tolist(), others.degrees.tolist(), strict=True)
+    return at_least(
+        constants, {n: abs(v - own[n]) + quantile(degrees) * error for n, v, error, degrees in told if n in own}
+    )
+
+
+def at_least(constants: Constants, reach: Mapping[str, float]) -> Constants:
+    """Constants whose intervals reach so far at least."""
     covariance = constants.covariance.copy()
-    for k, name in enumerate(constants.names):
-        if (j := known.get(name)) is None:
-            continue
-        far = abs(float(others.values[j] - constants.values[k]))
-        far += quantile(float(others.degrees[j])) * float(others.errors[j])
-        covariance[k, k] = max(covariance[k, k], (far / quantile(float(constants.degrees[k]))) ** 2)
+    for k, (name, degrees) in enumerate(zip(constants.names, constants.degrees.tolist(), strict=True)):
+        covariance[k, k] = max(covariance[k, k], (reach.get(name, 0.0) / quantile(degrees)) ** 2)
     return replace(constants, covariance=covariance)
 
 

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from detent.errors import InputError
 from detent.logs.log import Kind, Log, Values
 
+EVEN = 0.2  # distance of samples from an even grid, in its steps, up to which they are on it
 GAP = 1.5  # time between two samples, in periods, from which on something is missing between them
 FEWEST = 20  # samples below which nothing is said about a log
 _MASS = {"N": "kg", "N*m": "kg*m^2"}
@@ -105,8 +106,8 @@ def make_run(log: Log, effort: str | None = None) -> Run:
     reference = np.interp(grid, log.t, joined(log.signals["reference"], jumps)) if "reference" in log.signals else None
     values, resolution = log.signals[name], find_count(log.signals["position"])
     # What drives stands from each of its samples to the next.
-    is_even = len(grid) == len(log.t) and float(np.abs(grid - log.t).max()) < 0.2 * step
-    places = np.clip(np.searchsorted(log.t, grid + 0.2 * step, side="right") - 1, 0, len(log.t) - 1)
+    is_even = len(grid) == len(log.t) and float(np.abs(grid - log.t).max()) < EVEN * step
+    places = np.clip(np.searchsorted(log.t, grid + EVEN * step, side="right") - 1, 0, len(log.t) - 1)
     held = (values if is_even else values[places]).astype(np.float64, copy=False)
     units, noise = (log.units[name] or "1", log.units["position"]), max(noise_of(position), 0.29 * resolution)
     usable = _usable(log, grid, name)
@@ -135,7 +136,7 @@ def _usable(log: Log, grid: Values, effort: str) -> NDArray[np.bool_]:
     before = np.clip(np.searchsorted(log.t, grid, side="right") - 1, 0, len(log.t) - 1)
     after = np.clip(before + 1, 0, len(log.t) - 1)
     gap = log.t[after] - log.t[before] > GAP * log.period
-    return ~(bad[before] | (gap & (np.abs(grid - log.t[before]) > 0.2 * log.period)))
+    return ~(bad[before] | (gap & (np.abs(grid - log.t[before]) > EVEN * log.period)))
 
 
 def find_count(position: Values) -> float:

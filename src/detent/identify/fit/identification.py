@@ -29,6 +29,7 @@ from detent.identify.fit.ladder import (
     fit_rung,
 )
 from detent.identify.fit.output_error import STRETCH, fit_output_error
+from detent.identify.fit.readings import read_otherwise
 from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
 from detent.identify.fit.signals import look_at_log, scale_off
 from detent.identify.fit.steadiness import SCALE, Change, changes_of, widen
@@ -42,6 +43,7 @@ from detent.identify.fit.verdict import (
     look_at_fit,
     look_at_motion,
     look_at_prediction,
+    look_at_readings,
     look_at_windows,
     missed,
 )
@@ -195,11 +197,8 @@ def identify(
     refusals += tested.disagreement
     judged = _judge(runs, parts, climbs, tested, refusals)
     if method != "output error" and all(r.constants for r in judged):
-        refused = {name for r in judged for name in r.constants}
-        left = [name for name in constants.names if name not in refused]
-        moved = moved_by_windows(parts, own, left)
-        judged += look_at_windows(runs[0], [one for one in moved if not one.is_slight], left)
-        tested = tested._replace(constants=widened(tested.constants, moved))
+        tested, depends = _by_windows(parts, own, tested, judged)
+        judged += depends
     if method == "auto" and [r.subject for r in judged if not r.constants] == [FAR_OFF]:
         other = _other_way(runs, tested, fit, chosen_rung(climbs), report)
         if other.constants is not tested.constants:
@@ -207,6 +206,9 @@ def identify(
         tested = other
     doubt = doubt_of(parts, own, clearest)
     constants, horizons = further(tested.constants, doubt.times), tested.horizons
+    others = read_otherwise(logs, parts, fit, constants)
+    judged += look_at_readings(runs[0], others.held_by(tested.constants), parts, judged)
+    constants = others.held_by(constants)
     kernel, told = parts[0].motion.kernel, f"{runs[0].effort_name} [{runs[0].effort_unit}]"
     width = 2e3 * kernel.half * kernel.step
     notes = (f"effort: {told}", f"windows of {width:.3g} ms, {windows} of them", _WAYS[parts[0].instruments])
@@ -242,6 +244,18 @@ def _judge(
     """What is refused, with what constants and their simulation add to it."""
     found = [*refusals, *look_at_constants(runs[0], tested.constants, parts)]
     return [*found, *look_at_prediction(climbs, tested.horizons, found)]
+
+
+def _by_windows(
+    parts: Sequence[Prepared], fit: Fit, tested: _Tested, refusals: Sequence[Refusal]
+) -> tuple[_Tested, list[Refusal]]:
+    """Constants that wider windows tell otherwise: their limits hold both, and what differs by more is refused."""
+    refused = {name for r in refusals for name in r.constants}
+    left = [name for name in tested.constants.names if name not in refused]
+    moved = moved_by_windows(parts, fit, left)
+    depends = look_at_windows(parts[0].run, [one for one in moved if not one.is_slight], left)
+    constants = widened(tested.constants, {one.name: one.other - one.value for one in moved})
+    return tested._replace(constants=constants), list(depends)
 
 
 def _simulated(  # noqa: PLR0913 - all that a simulation consists of

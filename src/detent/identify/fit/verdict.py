@@ -246,6 +246,21 @@ def look_at_windows(run: Run, moved: Sequence[Moved], names: Collection[str]) ->
         yield Refusal("depends on the window", text, record, tuple(name for name in one.concerned if name in names))
 
 
+def look_at_readings(
+    run: Run, constants: Constants, parts: Sequence[Prepared], refused: Sequence[Refusal]
+) -> Iterator[Refusal]:
+    """Constants that are known well enough by one reading of the log, and by all of them not."""
+    known = {e.name: e for e in constants.estimates(run)}
+    open_now = {name for r in look_at_constants(run, constants, parts) for name in r.constants or ("mass",)}
+    before = {name for r in refused for name in r.constants or known}
+    if names := [name for name in known if name in open_now - before]:
+        told = ", ".join(
+            f"{name} {known[name].value:.4g} +- {known[name].half:.2g} {known[name].unit}" for name in names
+        )
+        text = f"{told}, as the log leaves open how late the effort is, or how even its clock"
+        yield Refusal("depends on the reading", text, "record effort and motion by one even clock", tuple(names))
+
+
 def level_of(effort: Values) -> float:
     """Distance of the values that an effort goes to from the nearest other value, the root mean square over these."""
     # A value that it keeps counts once: a command that is stepped is exact, however far its steps are.

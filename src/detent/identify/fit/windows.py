@@ -13,7 +13,7 @@ Hausman: Specification tests in econometrics. Econometrica 46 (1978), 1251: two 
 right, and not where it is wrong.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -105,10 +105,7 @@ def moved_by_windows(parts: Sequence[regression.Prepared], fit: regression.Fit, 
     return [one for far, one in sorted(found, reverse=True) if far > MOVED]
 
 
-def widened(constants: Constants, moved: Sequence[Moved]) -> Constants:
-    """Constants whose intervals carry by how much windows move them."""
-    covariance = constants.covariance.copy()
-    for one in moved:
-        k = constants.names.index(one.name)
-        covariance[k, k] += (one.other - one.value) ** 2
-    return replace(constants, covariance=covariance)
+def widened(constants: Constants, off: Mapping[str, float]) -> Constants:
+    """Constants whose intervals carry by how much something else would move them."""
+    by = np.array([off.get(name, 0.0) for name in constants.names])
+    return replace(constants, covariance=constants.covariance + np.diag(by**2))

@@ -71,8 +71,10 @@ def test_a_slight_change_widens_the_interval():
     slight = Moved("mass", mass, 1.005 * mass, 0.04)
     assert slight.is_slight
     assert not Moved("mass", mass, 1.011 * mass, 0.04).is_slight
-    assert widened(constants, [slight]).errors[0] == pytest.approx(np.hypot(error, 5e-3 * mass))
-    assert widened(constants, []).errors[0] == error
+    assert widened(constants, {slight.name: slight.other - slight.value}).errors[0] == pytest.approx(
+        np.hypot(error, 5e-3 * mass)
+    )
+    assert widened(constants, {}).errors[0] == error
 
 
 def test_what_pushes_for_a_moment_is_left_out_and_named():
