@@ -214,7 +214,7 @@ def identify(
     notes = (f"effort: {told}", f"windows of {width:.3g} ms, {windows} of them", _WAYS[parts[0].instruments])
     notes += tuple(_told_odd(log, run, rows) for log, run, rows in zip(logs, runs, odd, strict=True) if len(rows))
     notes += tuple(_told_scale(change) for change in changes if change.name == SCALE)
-    notes += (str(doubt),) if doubt.usual > TOLD else ()
+    notes += (*others.notes, str(doubt)) if doubt.usual > TOLD else others.notes
     notes += (tested.believed,) if tested.believed else ()
     if not tested.believed and method != "output error" and (miss := missed(horizons)) > WELL_MET:
         notes += (f"held-out travel is missed by {miss:.0%}: --method output-error may predict it better",)

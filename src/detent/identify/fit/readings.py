@@ -39,6 +39,7 @@ class Readings:
 
     moved: tuple[dict[str, float], ...]  # by how much each moves them
     least: dict[str, float]  # how far their limits reach at least
+    notes: tuple[str, ...]  # which they are
 
     def held_by(self, constants: Constants) -> Constants:
         """Constants whose limits hold those of all readings."""
@@ -49,9 +50,14 @@ def read_otherwise(
     logs: Sequence[Log], parts: Sequence[regression.Prepared], fit: regression.Fit, constants: Constants
 ) -> Readings:
     """Other readings of the logs of a fit, and of constants of it with limits."""
-    late = {"delay": max(abs(fit.value("delay")) - USUAL_DELAY * parts[0].run.step, 0.0)}
-    moved = (late, *_by_rows(logs, parts, fit))
-    return Readings(moved, _bent_by_delay(parts, fit, reduce(widened, moved, constants)))
+    late, step = fit.value("delay"), parts[0].run.step
+    beyond, by_rows, notes = max(abs(late) - USUAL_DELAY * step, 0.0), _by_rows(logs, parts, fit), list[str]()
+    if beyond:
+        notes.append(f"{1e3 * late:.3g} ms is no delay of a loop of {1e3 * step:.3g} ms: a filter may hold it")
+    if by_rows:
+        notes.append("the steps of the time are not even: the limits hold the constants by even rows, too")
+    moved = ({"delay": beyond}, *by_rows)
+    return Readings(moved, _bent_by_delay(parts, fit, reduce(widened, moved, constants)), tuple(notes))
 
 
 def _bent_by_delay(parts: Sequence[regression.Prepared], fit: regression.Fit, constants: Constants) -> dict[str, float]:
@@ -82,17 +88,21 @@ def _by_rows(logs: Sequence[Log], parts: Sequence[regression.Prepared], fit: reg
 
 def _uneven_pace(log: Log) -> float:
     """How far the steps of parts of a log are from the usual, over these, to each side; a tenth of the parts is not."""
-    rows = np.maximum(np.rint(np.diff(log.t) / log.period), 1.0)
-    count = min(max(len(rows) // ROWS_EACH, 1), MOST_PARTS)
-    means = [float(part.mean()) for part in np.array_split(np.diff(log.t) / rows, count)]
+    periods = _periods(log)
+    count = min(max(len(periods) // ROWS_EACH, 1), MOST_PARTS)
+    means = [float(part.mean()) for part in np.array_split(np.diff(log.t) / periods, count)]
     short, long = (float(np.quantile(means, share)) for share in (0.1, 0.9))
     return 0.5 * (long - short) / log.period
 
 
+def _periods(log: Log) -> Values:
+    """Whole periods from each row to the next."""
+    return np.maximum(np.rint(np.diff(log.t) / log.period), 1.0)
+
+
 def _of_even_rows(log: Log, run: Run) -> Run:
     """The same run with each row a whole number of periods behind the one before; itself where it is so."""
-    rows = np.maximum(np.rint(np.diff(log.t) / log.period), 1.0)
-    places = np.concatenate([[0.0], np.cumsum(rows)])
+    places = np.concatenate([[0.0], np.cumsum(_periods(log))])
     even = np.asarray(log.t[0] + places * (np.ptp(log.t) / places[-1]), np.float64)
     if float(np.abs(even - log.t).max()) < EVEN * run.step:
         return run
