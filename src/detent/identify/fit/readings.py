@@ -1,9 +1,9 @@
 """Other readings of a log that it does not rule out: limits hold the constants of all of them.
 
 - Steps of the time that are not even are those of a sampler that waits, whose stamps are right, or of a clock that is
-  not even beside rows that are. Constants by the rows, each a period behind the other, stand beside those by the
-  stamps. And such a clock may run right where it is fastest, or slowest: with its seconds grow masses by their square,
-  viscous frictions and delays by themselves.
+  not even beside rows that are. Unless they leave more of the effort, constants by the rows, each a period behind the
+  other, stand beside those by the stamps. And such a clock may run right where it is fastest, or slowest: with its
+  seconds grow masses by their square, viscous frictions and delays by themselves.
 - A delay of more than a few samples is none that a sampled loop has, but what a filter, or a sensor that is late in a
   part of the motion, makes of the log: it may be as well that of a loop.
 - What a delay does to the effort is no straight line: on the mean of both, the longest and the shortest that its limits
@@ -23,12 +23,13 @@ import numpy as np
 from detent.identify.fit import equations, regression
 from detent.identify.fit.constants import Constants, at_least, constants_of
 from detent.identify.fit.equations import EVEN, Run, make_run
-from detent.identify.fit.estimate import quantile
+from detent.identify.fit.estimate import quantile, rms
 from detent.identify.fit.verdict import USUAL_DELAY
 from detent.identify.fit.windows import widened
 from detent.logs.log import Log, Values
 
 MOST_LATE = 5.0  # delay that limits are worked out with, in half windows: beyond it hardly anything is left to compare
+WORSE = 1.05  # residual by even rows, in that by stamps, from which on the log tells that rows are not even
 ROWS_EACH, MOST_PARTS = 10, 128  # rows of a part of a log whose pace is looked at, at least, and parts, at most
 SECONDS = {"mass": 2.0, "viscous": 1.0, "delay": 1.0, "stribeck": -1.0}  # powers of the second that constants grow by
 
@@ -52,7 +53,7 @@ def read_otherwise(
     """Other readings of the logs of a fit, and of constants of it with limits."""
     late, step = fit.value("delay"), parts[0].run.step
     beyond, by_rows, notes = max(abs(late) - USUAL_DELAY * step, 0.0), _by_rows(logs, parts, fit), list[str]()
-    if beyond:
+    if beyond and constants.delay_is_told:
         notes.append(f"{1e3 * late:.3g} ms is no delay of a loop of {1e3 * step:.3g} ms: a filter may hold it")
     if by_rows:
         notes.append("the steps of the time are not even: the limits hold the constants by even rows, too")
@@ -72,7 +73,7 @@ def _bent_by_delay(parts: Sequence[regression.Prepared], fit: regression.Fit, co
 
 
 def _by_rows(logs: Sequence[Log], parts: Sequence[regression.Prepared], fit: regression.Fit) -> list[dict[str, float]]:
-    """By how much constants change where rows, and not stamps, are even, and with the pace; nothing for even stamps."""
+    """By how much constants change where rows, not stamps, are even, and with the pace; nothing where stamps are."""
     others = [_of_even_rows(log, p.run) for log, p in zip(logs, parts, strict=True)]
     if all(other is p.run for other, p in zip(others, parts, strict=True)):
         return []
@@ -80,7 +81,10 @@ def _by_rows(logs: Sequence[Log], parts: Sequence[regression.Prepared], fit: reg
         regression.prepare(other, equations.make_kernel(p.motion.kernel.half, other.step), p.instruments)
         for other, p in zip(others, parts, strict=True)
     ]
-    rows = _sums(fit, regression.fit_equations(again, fit.model, fit.bend).values - fit.values)
+    other = regression.fit_equations(again, fit.model, fit.bend)
+    if rms(other.residual) > WORSE * rms(fit.residual):
+        return []  # the stamps are those of the motion
+    rows = _sums(fit, other.values - fit.values)
     pace, own = max(map(_uneven_pace, logs)), constants_of(fit)
     powers = [SECONDS.get(name.partition(".")[0], 0.0) for name in own.names]
     return [rows, {n: by * pace * v for n, by, v in zip(own.names, powers, own.values.tolist(), strict=True)}]
