@@ -207,7 +207,7 @@ def identify(
     doubt = doubt_of(parts, own, clearest)
     constants, horizons = further(tested.constants, doubt.times), tested.horizons
     others = read_otherwise(logs, parts, fit, constants)
-    judged += look_at_readings(runs[0], others.held_by(tested.constants), parts, judged)
+    judged += look_at_readings(others.held_by(tested.constants), parts, judged, others.left_open)
     constants = others.held_by(constants)
     kernel, told = parts[0].motion.kernel, f"{runs[0].effort_name} [{runs[0].effort_unit}]"
     width = 2e3 * kernel.half * kernel.step

@@ -42,6 +42,11 @@ class Readings:
     least: dict[str, float]  # how far their limits reach at least
     notes: tuple[str, ...]  # which they are
 
+    @property
+    def left_open(self) -> str:
+        """What the log does not tell, in words."""
+        return "how late the effort is" if len(self.moved) == 1 else "how even its clock is, and how late the effort"
+
     def held_by(self, constants: Constants) -> Constants:
         """Constants whose limits hold those of all readings."""
         return at_least(reduce(widened, self.moved, constants), self.least)

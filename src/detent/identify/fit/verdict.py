@@ -247,9 +247,10 @@ def look_at_windows(run: Run, moved: Sequence[Moved], names: Collection[str]) ->
 
 
 def look_at_readings(
-    run: Run, constants: Constants, parts: Sequence[Prepared], refused: Sequence[Refusal]
+    constants: Constants, parts: Sequence[Prepared], refused: Sequence[Refusal], left_open: str
 ) -> Iterator[Refusal]:
-    """Constants that are known well enough by one reading of the log, and by all of them not."""
+    """Constants that one reading of a log tells well enough, and all of them together do not."""
+    run = parts[0].run
     known = {e.name: e for e in constants.estimates(run)}
     open_now = {name for r in look_at_constants(run, constants, parts) for name in r.constants or ("mass",)}
     before = {name for r in refused for name in r.constants or known}
@@ -257,7 +258,7 @@ def look_at_readings(
         told = ", ".join(
             f"{name} {known[name].value:.4g} +- {known[name].half:.2g} {known[name].unit}" for name in names
         )
-        text = f"{told}, as the log leaves open how late the effort is, or how even its clock"
+        text = f"{told}, as the log leaves open {left_open}"
         yield Refusal("depends on the reading", text, "record effort and motion by one even clock", tuple(names))
 
 

@@ -73,6 +73,7 @@ def test_a_clock_that_is_late_in_single_rows_leaves_open_which_rows():
     assert pace["mass"] / constants.value("mass") == pytest.approx(2.0 * pace["delay"] / constants.value("delay"))
     assert pace["coulomb.positive"] == 0.0
     assert any("steps of the time are not even" in note for note in found.notes)
+    assert found.left_open == "how even its clock is, and how late the effort"
 
 
 def test_stamps_of_a_sampler_that_waits_are_right():
@@ -119,13 +120,13 @@ def test_limits_reach_as_far_as_the_delays_at_their_ends_bend_the_constants():
 
 def test_what_they_leave_open_by_too_much_is_refused():
     made = log()
-    parts, constants, _ = read(made)
+    parts, constants, found = read(made)
     wide = replace(constants, covariance=constants.covariance + np.diag([1.0, *np.zeros(len(constants.names) - 1)]))
-    (refused,) = look_at_readings(parts[0].run, wide, parts, [])
+    (refused,) = look_at_readings(wide, parts, [], found.left_open)
     assert (refused.subject, refused.constants) == ("depends on the reading", ("mass",))
-    assert "mass 2.001 +- 2 kg, as the log leaves open" in refused.text
-    assert not [*look_at_readings(parts[0].run, wide, parts, [refused])]
-    assert not [*look_at_readings(parts[0].run, constants, parts, [])]
+    assert refused.text == "mass 2.001 +- 2 kg, as the log leaves open how late the effort is"
+    assert not [*look_at_readings(wide, parts, [refused], found.left_open)]
+    assert not [*look_at_readings(constants, parts, [], found.left_open)]
 
 
 def test_the_notes_of_an_identification_say_so():
