@@ -90,7 +90,7 @@ class Identified(OnScreen):
             text = written(one)
             known = is_known(one)
             scale = 1e3 if one.unit == "s" else 1.0
-            limits = f"{one.low * scale:.5g} to {one.high * scale:.5g}" if known else ""
+            limits = f"{one.low * scale:.5g} to {one.high * scale:.5g}".replace("-", "\u2212") if known else ""
             trust = "yes" if one in self.found.trusted else "no"
             value = f"{text.value} ± {text.half}" if known else "not determined by the data"
             if one.name in self.found.bounded:
