@@ -187,14 +187,9 @@ def _spread_stamps(draft: Draft) -> None:
 
 def look_at_clock(draft: Draft) -> None:
     """Find rows that are missing, and a clock that runs unevenly: `JITTER` of its steps deviate by more than that."""
-    # Of an even recording, a step of 1.5 usual ones (the median) is rows missing; of an irregular one, a step of 2.5,
-    # as a late row does not yet mean a lost one.
-    steps = np.diff(draft.t)
-    usual = float(np.median(steps))
-    ratio = steps / usual
-    deviation = np.abs(ratio - np.maximum(1.0, np.rint(ratio)))
-    is_uneven = float(np.mean(deviation > JITTER)) > JITTER
-    gaps = np.flatnonzero(ratio >= (2.5 if is_uneven else 1.5))
+    ratio, is_uneven = in_usual_steps(draft.t)
+    usual, deviation = float(np.median(np.diff(draft.t))), np.abs(ratio - np.maximum(1.0, np.rint(ratio)))
+    gaps = np.flatnonzero(is_gap(ratio, is_uneven=is_uneven))
     if is_uneven:
         low, high = np.percentile(ratio, [1, 99])
         step = f"the usual {usual * 1e3:.4g} ms"
@@ -205,7 +200,7 @@ def look_at_clock(draft: Draft) -> None:
         if len(odd):
             text = f"{tell_count(len(odd), 'step')} other than the usual {usual * 1e3:.4g} ms"
             draft.note(Kind.IRREGULAR_TIME, "time", odd + 1, text, Action.LEFT, "", Severity.NOTE)
-    if drift := _drift(steps[ratio < (2.5 if is_uneven else 1.5)]):
+    if drift := _drift(np.diff(draft.t)[~is_gap(ratio, is_uneven=is_uneven)]):
         least, most = drift
         span = f"{least * 1e3:.4g} and {most * 1e3:.4g} ms"
         text = f"steps go evenly between {span}: sampler and clock do not run together"
@@ -215,6 +210,20 @@ def look_at_clock(draft: Draft) -> None:
         lost = [round(one) - 1 for one in ratio[gaps].tolist()]  # a stamp far off makes more of them than 64 bits hold
         text = f"about {tell_count(sum(lost), 'row')} missing before these, at most {max(lost)} at once"
         draft.note(Kind.DROPPED_ROWS, "", gaps + 1, text, Action.LEFT)
+
+
+def in_usual_steps(t: Values) -> tuple[Values, bool]:
+    """Steps of a clock in the usual one, the median, and whether they are uneven."""
+    steps = np.diff(t)
+    ratio = steps / np.median(steps)
+    return ratio, float(np.mean(np.abs(ratio - np.maximum(1.0, np.rint(ratio))) > JITTER)) > JITTER
+
+
+def is_gap(ratio: Values, *, is_uneven: bool) -> NDArray[np.bool_]:
+    """True for each step, in the usual one, across which rows are missing."""
+    # Of an even recording, that is a step of 1.5 usual ones; of an irregular one, of 2.5, as a late row does not yet
+    # mean a lost one.
+    return ratio >= (2.5 if is_uneven else 1.5)
 
 
 def _drift(steps: Values) -> tuple[float, float] | None:

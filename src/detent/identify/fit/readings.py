@@ -25,8 +25,9 @@ from detent.identify.fit.constants import Constants, at_least, constants_of
 from detent.identify.fit.equations import EVEN, Run, make_run
 from detent.identify.fit.estimate import quantile, rms
 from detent.identify.fit.verdict import USUAL_DELAY
-from detent.identify.fit.windows import widened
+from detent.identify.fit.windows import FEWEST, widened
 from detent.logs.log import Log, Values
+from detent.logs.stamps import in_usual_steps, is_gap
 
 MOST_LATE = 5.0  # delay that limits are worked out with, in half windows: beyond it hardly anything is left to compare
 WORSE = 1.05  # residual by even rows, in that by stamps, from which on the log tells that rows are not even
@@ -86,6 +87,8 @@ def _by_rows(logs: Sequence[Log], parts: Sequence[regression.Prepared], fit: reg
         regression.prepare(other, equations.make_kernel(p.motion.kernel.half, other.step), p.instruments)
         for other, p in zip(others, parts, strict=True)
     ]
+    if sum(len(p.motion.rows) for p in again) < FEWEST * len(fit.names):
+        return []
     other = regression.fit_equations(again, fit.model, fit.bend)
     if rms(other.residual) > WORSE * rms(fit.residual):
         return []  # the stamps are those of the motion
@@ -105,8 +108,9 @@ def _uneven_pace(log: Log) -> float:
 
 
 def _periods(log: Log) -> Values:
-    """Whole periods from each row to the next."""
-    return np.maximum(np.rint(np.diff(log.t) / log.period), 1.0)
+    """Periods from each row to the next: one, but where rows are missing."""
+    ratio, is_uneven = in_usual_steps(log.t)
+    return np.where(is_gap(ratio, is_uneven=is_uneven), np.rint(ratio), 1.0)
 
 
 def _of_even_rows(log: Log, run: Run) -> Run:

@@ -60,6 +60,22 @@ def test_gaps_that_are_whole_rows_are_even_too():
     assert read(made)[2].notes == ()
 
 
+def test_steps_of_more_than_one_and_a_half_periods_are_no_lost_rows_of_a_clock_with_jitter():
+    """Each of them was taken for a row that is missing, and none of the windows was left by such rows."""
+    made = log(T + 0.26 * STEP * np.random.default_rng(5).uniform(-1.0, 1.0, len(T)))
+    assert np.count_nonzero(np.diff(made.t) > 1.5 * STEP) > 5
+    _, constants, found = read(made)
+    assert constants.value("mass") + found.moved[1]["mass"] == pytest.approx(MASS, rel=1e-3)
+    assert np.isfinite(found.held_by(constants).errors).all()
+
+
+def test_stamps_by_which_hardly_a_window_is_left_have_no_other_reading():
+    made = log(T + 0.4 * STEP * np.random.default_rng(5).uniform(-1.0, 1.0, len(T)))
+    parts, _, found = read(made)
+    assert len(parts[0].motion.rows) < 3 * len(TERMS)
+    assert len(found.moved) == 1
+
+
 def test_a_clock_that_is_late_in_single_rows_leaves_open_which_rows():
     """One step in ten is written 12 % too long: the mass by the stamps is wrong, that by even rows right."""
     steps = STEP * np.where(np.random.default_rng(3).random(len(T)) < 0.1, 1.12, 1.0)
